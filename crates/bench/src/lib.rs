@@ -3,7 +3,7 @@
 //! A [`campaign`] runs problems × solvers × tolerances and writes [`runs`], lines of [`record`]s; [`foreign`] measurements of
 //! other programs join them. [`profile`]s and [`tables`] are computed from runs, [`figures`] drawn, a
 //! [`report`] for browsers and a [`page`] of Markdown written, and two campaigns set against each other by [`compare`]. [`traits_table`] says what the problems are like. Examples measure single
-//! kernels: `sweeps` a sweep against streaming W once, `factorisation` Newton's factorisations against faer's, `lemke` its bases.
+//! kernels: `sweeps` a sweep against streaming W once, `factorisation` Newton's factorisations against faer's, `lemke` its bases, `fields` a function and its derivatives, `flush` what a growing trajectory costs; `warm` a session's solves.
 
 pub mod campaign;
 pub mod compare;

@@ -59,8 +59,9 @@ pub fn check(problems: &[PathBuf], path: &Path, as_json: bool) -> Result<Exit, S
 /// The claim in a file: what `solve` or `exists` wrote, or what stands there under `certificate`.
 fn read(path: &Path) -> Result<Claim, String> {
     let mistake = |what: String| format!("--certificate {}: {what}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|e| mistake(e.to_string()))?;
-    let all: Value = serde_json::from_str(&text).map_err(|e| mistake(e.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|e| mistake(e.to_string()))?;
+    let all: Value = serde_json::from_slice(&bytes)
+        .map_err(|e| mistake(format!("expected a certificate in JSON, found {e}")))?;
     let vector = |value: &Value| {
         serde_json::from_value::<ExactVector>(value.clone())
             .map_err(|e| mistake(format!("a vector of fractions: {e}")))

@@ -60,6 +60,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let written = targets.iter().flatten().map(|path| ("--certificate", path.as_path()));
     files::apart(args.files.iter().map(PathBuf::as_path), written)?;
+    for path in targets.iter().flatten() {
+        files::ends_in("--certificate", path, &["json"])?;
+        output::results_are_filed();
+    }
     let limits = Limits {
         time_limit,
         cancel: Some(interrupt::flag()),

@@ -77,7 +77,7 @@ Examples:
   nonsmooth check solved.hdf5                        have the solution judged again
   nonsmooth solve rectifier.toml --trace pivots.json a complementarity problem, and what the method did
   nonsmooth convert solved.hdf5 contacts.csv         the solution as a table, or a problem in another format
-  nonsmooth draw solved.hdf5                         matrices, sizes of the impulses, friction cones
+  nonsmooth draw solved.hdf5                         its bodies with the impulses, or matrices and friction cones
   nonsmooth simulate wall --end 0.5 --html wall.html bodies in motion, as a page that plays
   nonsmooth list                                     the solvers and their settings
   nonsmooth bench run problems/ --out runs.jsonl     compare solvers on folders of problems

@@ -1,11 +1,20 @@
 //! The two streams: results on stdout, mistakes on stderr. Neither ever makes the program panic.
 
 use std::io::{ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What a shell reports of a program that a closed pipe has ended.
 const BROKEN_PIPE: i32 = 128 + 13;
 
-/// Prints a result. Ends the program, without a word, where nobody reads any more (`| head -1`).
+/// Whether results go to files too.
+static FILED: AtomicBool = AtomicBool::new(false);
+
+/// What is computed goes to files too: the program goes on where nobody reads any more what it prints.
+pub fn results_are_filed() {
+    FILED.store(true, Ordering::Relaxed);
+}
+
+/// Prints a result. Ends the program, without a word, where nobody reads any more (`| head -1`) and nothing goes to files.
 pub fn print(text: &str) {
     print_bytes(text.as_bytes());
 }
@@ -16,6 +25,9 @@ pub fn print_bytes(bytes: &[u8]) {
     let written = out.write_all(bytes).and_then(|()| out.flush());
     if let Err(e) = written {
         if e.kind() == ErrorKind::BrokenPipe {
+            if FILED.load(Ordering::Relaxed) {
+                return;
+            }
             std::process::exit(BROKEN_PIPE);
         }
         error(&format!("standard output: {e}"));

@@ -70,8 +70,8 @@ pub struct Args {
     /// The seed of the random points of --multistart
     #[arg(long, value_name = "S", requires = "multistart", default_value = "0")]
     seed: u64,
-    /// Write the problem with its solution, in the format of the extension: FCLIB (.hdf5), TOML (.toml) or Matrix Market (.mtx,
-    /// vectors beside); .csv is a table of the solution alone. A directory (existing or ending in `/`) for several files, `-` for the
+    /// Write the problem with its solution, in the format of the extension: FCLIB (.hdf5), TOML (.toml), Matrix Market (.mtx,
+    /// vectors beside) or AMPL's (.nl); .csv is a table of the solution alone. A directory (existing or ending in `/`) for several files, `-` for the
     /// standard output. A new file holds the problem, its info, guesses and solution, and nothing else of the input; of the input
     /// itself, which may be named, only the solution changes
     #[arg(long, value_name = "FILE")]
@@ -141,6 +141,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     limits.threads = args.threads;
     limits.trace = args.trace.is_some() || args.plot.is_some();
     let targets = Targets::new(args)?;
+    if targets.any() {
+        output::results_are_filed();
+    }
     let cancel = limits.cancel.clone().unwrap_or_default();
     let plan = Plan {
         solver: &args.solver,
@@ -588,6 +591,13 @@ struct Target<'a> {
 }
 
 impl Targets {
+    /// Whether something goes to a file.
+    fn any(&self) -> bool {
+        let Self { out, plot, trace, certificate } = self;
+        let all = [out, plot, trace, certificate].into_iter().flatten().flatten();
+        all.into_iter().any(|path| !files::is_stream(path))
+    }
+
     fn new(args: &Args) -> Result<Self, String> {
         // In a directory, formats that hold no solution give way to others.
         let names: Vec<_> = args.files.iter().map(|file| keeper(file)).collect();
@@ -599,7 +609,6 @@ impl Targets {
         let plot = place("--plot", &args.plot, Some("svg"))?;
         let trace = place("--trace", &args.trace, Some("trace.json"))?;
         let certificate = place("--certificate", &args.certificate, Some("certificate.json"))?;
-        plot.iter().flatten().try_for_each(|path| files::ends_in("--plot", path, &["svg"]))?;
         fn written<'a>(
             option: &'a str,
             all: &'a Option<Vec<PathBuf>>,
@@ -617,6 +626,13 @@ impl Targets {
                 .chain(written("--trace", &trace))
                 .chain(written("--certificate", &certificate)),
         )?;
+        for (option, all, end) in [
+            ("--plot", &plot, "svg"),
+            ("--trace", &trace, "json"),
+            ("--certificate", &certificate, "json"),
+        ] {
+            all.iter().flatten().try_for_each(|path| files::ends_in(option, path, &[end]))?;
+        }
         Ok(Self { out, plot, trace, certificate })
     }
 

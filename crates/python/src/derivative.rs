@@ -46,7 +46,7 @@ impl Derivative {
         }
         let problem = problem.get();
         let file = problem.file();
-        let point = point(&file.problem, answer)?;
+        let point = point(&file.problem, "answer", answer)?;
         file.problem.validate_point(&point).map_err(mistake)?;
         // F may be a function of Python, and a factorisation may take long.
         let watcher = Arc::new(Watcher::default());

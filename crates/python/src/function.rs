@@ -1,8 +1,10 @@
 //! F and its Jacobian by functions of Python.
 //!
-//! The library calls them from the thread that solves, which holds Python's lock meanwhile. An exception ends the solves that are under way with this function and
-//! is raised where they were called. Cost of a call: that of the function, and two copies of n numbers.
+//! The library calls them from the thread that solves, which holds Python's lock meanwhile, in the context (`contextvars`) in which the solve was asked for. An exception ends
+//! that solve, in which nothing is called any more, and is raised where it was called; but where F is only asked whether it is defined ([`is_tentative`]) it is the answer that it is
+//! not. Cost of a call: that of the function, and two copies of n numbers.
 
+use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -24,6 +26,15 @@ pub struct Watcher {
     /// Set where it has to.
     pub stop: Arc<AtomicBool>,
     fault: Mutex<Option<PyErr>>,
+    /// Whether it was a function of the user's that failed: then none is called any more.
+    failed: AtomicBool,
+    /// In which the functions run on another thread.
+    context: Option<Py<PyAny>>,
+}
+
+thread_local! {
+    /// The solve that this thread is at work for.
+    static SOLVE: RefCell<Option<Arc<Watcher>>> = const { RefCell::new(None) };
 }
 
 /// What a thread that panicked left is whole all the same: it is written in one go.
@@ -32,6 +43,25 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Watcher {
+    /// Of a solve on another thread, for the present context.
+    pub fn elsewhere(py: Python<'_>) -> PyResult<Self> {
+        let context = py.import("contextvars")?.call_method0("copy_context")?.unbind();
+        Ok(Self { context: Some(context), ..Self::default() })
+    }
+
+    /// Does a task of this solve: what its functions raise is told to it alone.
+    pub fn at_work<T>(self: &Arc<Self>, task: impl FnOnce() -> T) -> T {
+        /// A solve within a function of another solve is done.
+        struct Before(Option<Arc<Watcher>>);
+        impl Drop for Before {
+            fn drop(&mut self) {
+                SOLVE.with_borrow_mut(|now| *now = self.0.take());
+            }
+        }
+        let _before = Before(SOLVE.with_borrow_mut(|now| now.replace(self.clone())));
+        task()
+    }
+
     /// Ends the solve with an exception; the first one counts.
     pub fn fail(&self, fault: PyErr) {
         locked(&self.fault).get_or_insert(fault);
@@ -60,10 +90,14 @@ impl Faults {
         Watching(self, watcher.clone())
     }
 
-    fn raise(&self, py: Python<'_>, fault: &PyErr) {
-        // Not while the lock is held: a copy of an exception runs Python.
-        let watchers = locked(&self.0).clone();
-        watchers.iter().for_each(|watcher| watcher.fail(fault.clone_ref(py)));
+    /// The solve that asks now; all where that is not known, as on threads of the library's own.
+    fn asking(&self) -> Vec<Arc<Watcher>> {
+        let mine = SOLVE.with_borrow(Clone::clone);
+        let all = locked(&self.0);
+        match mine.filter(|mine| all.iter().any(|one| Arc::ptr_eq(one, mine))) {
+            Some(mine) => vec![mine],
+            None => all.clone(),
+        }
     }
 }
 
@@ -84,14 +118,33 @@ impl Call {
         out: &mut [f64],
         read: impl Fn(&Bound<'_, PyAny>, &mut [f64]) -> PyResult<()>,
     ) {
+        let asking = self.faults.asking();
+        if !asking.is_empty() && asking.iter().all(|one| one.failed.load(Ordering::Relaxed)) {
+            return out.fill(f64::NAN);
+        }
+        let context = match &asking[..] {
+            [one] => one.context.as_ref(),
+            _ => None,
+        };
         // Without an interpreter, which is being shut down, nothing is defined.
         let done = Python::try_attach(|py| {
-            let found = self.function.bind(py).call1((PyArray1::from_slice(py, x),));
+            let (function, x) = (self.function.bind(py), PyArray1::from_slice(py, x));
+            let found = match context {
+                // A copy, since a context is entered by one thread at a time.
+                Some(context) => {
+                    let copy = context.bind(py).call_method0("copy");
+                    copy.and_then(|copy| copy.call_method1("run", (function, x)))
+                }
+                None => function.call1((x,)),
+            };
             let done = found.and_then(|found| read(&found, out));
             done.map_err(|fault| {
                 // Ctrl-C is no exception of the function's.
                 if !(is_tentative() && fault.is_instance_of::<PyException>(py)) {
-                    self.faults.raise(py, &fault);
+                    for one in &asking {
+                        one.failed.store(true, Ordering::Relaxed);
+                        one.fail(fault.clone_ref(py));
+                    }
                 }
             })
             .is_ok()
@@ -112,15 +165,21 @@ fn values(found: &Bound<'_, PyAny>, out: &mut [f64]) -> PyResult<()> {
     Ok(())
 }
 
+/// A matrix with a row and a column for each of n variables.
+fn square(place: &str, found: &Bound<'_, PyAny>, n: usize) -> PyResult<Matrix> {
+    let matrix = numbers::matrix(place, found)?;
+    if (matrix.nrows(), matrix.ncols()) == (n, n) {
+        return Ok(matrix);
+    }
+    let found = format!("{} × {}", matrix.nrows(), matrix.ncols());
+    Err(expected(place, &format!("{n} × {n} (entries of x)"), found))
+}
+
+const JACOBIAN: &str = "jac(x)";
+
 /// The entries of a Jacobian at the places of a pattern; all others are zero.
 fn entries(found: &Bound<'_, PyAny>, pattern: &Pattern, out: &mut [f64]) -> PyResult<()> {
-    const PLACE: &str = "jac(x)";
-    let n = pattern.rows();
-    let matrix = numbers::matrix(PLACE, found)?;
-    if (matrix.nrows(), matrix.ncols()) != (n, n) {
-        let found = format!("{} × {}", matrix.nrows(), matrix.ncols());
-        return Err(expected(PLACE, &format!("{n} × {n} (entries of x)"), found));
-    }
+    let matrix = square(JACOBIAN, found, pattern.rows())?;
     out.fill(0.0);
     let mut outside = None;
     matrix.for_each(|i, j, x| match pattern.row(i).binary_search(&j) {
@@ -132,7 +191,7 @@ fn entries(found: &Bound<'_, PyAny>, pattern: &Pattern, out: &mut [f64]) -> PyRe
     });
     match outside {
         Some((i, j, x)) => {
-            Err(expected(&format!("{PLACE}[{i}, {j}]"), "zero, as the pattern says", x))
+            Err(expected(&format!("{JACOBIAN}[{i}, {j}]"), "zero, as the pattern says", x))
         }
         None => Ok(()),
     }
@@ -171,23 +230,19 @@ pub fn field(
         false => call.write(x, f, values),
     };
     let pattern = match (pattern, jacobian) {
-        (Some(given), _) => Some(places(&numbers::matrix("pattern", given)?)?),
+        (Some(given), _) => Some(places(&square("pattern", given, x.len())?)?),
         (None, Some(jacobian)) => {
             let there = jacobian.call1((PyArray1::from_slice(jacobian.py(), x),))?;
-            match numbers::Sparse::of("jac(x)", &there)? {
-                Some(sparse) => Some(places(&sparse.csc("jac(x)")?.into())?),
-                None => Some(Pattern::dense(x.len())),
-            }
+            let matrix = square(JACOBIAN, &there, x.len())?;
+            Some(match numbers::Sparse::of(JACOBIAN, &there)? {
+                Some(_) => places(&matrix)?,
+                None => Pattern::dense(x.len()),
+            })
         }
         (None, None) => None,
     };
-    if let Some(pattern) = pattern.as_ref().filter(|p| p.rows() != x.len()) {
-        let what = format!("{0} × {0} (entries of x)", x.len());
-        return Err(expected("pattern", &what, format!("{} rows", pattern.rows())));
-    }
     let field: Arc<dyn Field> = match (jacobian, pattern) {
-        (Some(jacobian), pattern) => {
-            let pattern = pattern.unwrap_or_else(|| Pattern::dense(x.len()));
+        (Some(jacobian), Some(pattern)) => {
             let jac = Call::new(jacobian, faults);
             let along = pattern.clone();
             let jac = move |x: &[f64], j: &mut [f64]| {
@@ -198,7 +253,7 @@ pub fn field(
             Arc::new(Closures::new(pattern, value, jac).map_err(mistake)?)
         }
         (None, Some(pattern)) => Arc::new(Differences::new(pattern, value).map_err(mistake)?),
-        (None, None) => Arc::new(Differences::probed(x, value).map_err(mistake)?),
+        (_, None) => Arc::new(Differences::probed(x, value).map_err(mistake)?),
     };
     match watcher.fault() {
         Some(fault) => Err(fault),

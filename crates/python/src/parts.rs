@@ -148,13 +148,7 @@ impl<'a> Parts for Given<'a, '_> {
 
     fn count(&mut self, name: &'static str) -> Result<usize, ProblemError> {
         let count = |given: &Bound<'_, PyAny>| {
-            given.extract().map_err(|_| {
-                expected(
-                    name,
-                    "a whole number of at least 0",
-                    given.repr().map_or_else(|e| e.to_string(), |r| r.to_string()),
-                )
-            })
+            given.extract().map_err(|_| expected(name, WHOLE, shown_as(given)))
         };
         let old = |part: &Part<'a>| match part {
             Part::Count(count) => Some(*count),
@@ -186,6 +180,13 @@ impl<'a> Parts for Given<'a, '_> {
     }
 }
 
+const WHOLE: &str = "a whole number of at least 0";
+
+/// An object as Python shows it.
+fn shown_as(given: &Bound<'_, PyAny>) -> String {
+    given.repr().map_or_else(|e| e.to_string(), |r| r.to_string())
+}
+
 /// The name of an object's type.
 pub fn type_name(given: &Bound<'_, PyAny>) -> String {
     given.get_type().name().map_or_else(|_| "an object".into(), |name| name.to_string())
@@ -193,11 +194,21 @@ pub fn type_name(given: &Bound<'_, PyAny>) -> String {
 
 /// A set as `_parts()` of the classes of sets states it: a dictionary with its `kind` and its parts.
 pub fn set(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Set> {
+    set_within(place, given, DEEPEST)
+}
+
+/// Products within products: a set that is a part of itself has no end.
+const DEEPEST: usize = 64;
+
+fn set_within(place: &str, given: &Bound<'_, PyAny>, left: usize) -> PyResult<Set> {
     let refused = || {
         let what = "a set (Box, Polyhedron, Ball, SecondOrderCone or Product)";
         expected(place, what, type_name(given))
     };
-    let parts = given.call_method0("_parts").map_err(|_| refused())?;
+    if !given.hasattr("_parts")? {
+        return Err(refused());
+    }
+    let parts = given.call_method0("_parts")?;
     let parts = parts.cast::<PyDict>().map_err(|_| refused())?;
     let kind: String = parts.get_item("kind")?.ok_or_else(refused)?.extract()?;
     let part = |name: &str| parts.get_item(name)?.ok_or_else(refused);
@@ -209,21 +220,31 @@ pub fn set(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Set> {
         "polyhedron" => {
             Set::Polyhedron { A: matrix("A")?, b: vector("b")?, C: matrix("C")?, d: vector("d")? }
         }
-        "ball" => Set::Ball { centre: vector("centre")?, radius: part("radius")?.extract()? },
-        "second_order_cone" => Set::SecondOrderCone { dimension: part("dimension")?.extract()? },
+        "ball" => {
+            let (centre, radius) = (vector("centre")?, part("radius")?);
+            let read = |_| expected(&at("radius"), "a number", shown_as(&radius));
+            Set::Ball { centre, radius: radius.extract().map_err(read)? }
+        }
+        "second_order_cone" => {
+            let dimension = part("dimension")?;
+            let read = |_| expected(&at("dimension"), WHOLE, shown_as(&dimension));
+            Set::SecondOrderCone { dimension: dimension.extract().map_err(read)? }
+        }
         "product" => {
+            let left = left.checked_sub(1).ok_or_else(|| {
+                let what = format!("products at most {DEEPEST} deep");
+                expected("set", &what, "a deeper one")
+            })?;
             let inner = part("sets")?.try_iter()?;
-            let inner = inner.enumerate().map(|(k, one)| set_at(place, k, one?));
-            Set::Product(inner.collect::<PyResult<_>>()?)
+            let each = |(k, one): (usize, PyResult<Bound<'_, PyAny>>)| {
+                set_within(&format!("{place}[{k}]"), &one?, left)
+            };
+            Set::Product(inner.enumerate().map(each).collect::<PyResult<_>>()?)
         }
         _ => return Err(refused()),
     };
     set.validate().map_err(|e| mistake(e.within(place)))?;
     Ok(set)
-}
-
-fn set_at(place: &str, k: usize, given: Bound<'_, PyAny>) -> PyResult<Set> {
-    set(&format!("{place}[{k}]"), &given)
 }
 
 /// A part of a problem as Python sees it: arrays, of sparse matrices those of compressed columns.

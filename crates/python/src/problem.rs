@@ -8,7 +8,7 @@ use nonsmooth_problem::{
     AnyPoint, AnyProblem, Complementarity, Kind, Mcp, OfAny, Problem as _, Shape, Stated, Vi,
     each_kind, with_complementarity,
 };
-use nonsmooth_solve::Kept;
+use nonsmooth_solve::{Kept, Limits};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
@@ -338,6 +338,16 @@ impl Problem {
         crate::solve::arrays(py, file.problem.point_parts(&stored.point, &partner)).map(Some)
     }
 
+    /// Another problem, as this is now: to change one leaves the other as it is. A function of Python is the same.
+    fn copy(&self) -> Self {
+        let file = self.file.read().unwrap_or_else(PoisonError::into_inner).clone();
+        Self {
+            file: RwLock::new(file),
+            kept: Mutex::new(Kept::default()),
+            faults: self.faults.clone(),
+        }
+    }
+
     /// The residuals of a point, by the judge.
     fn judge<'py>(
         &self,
@@ -347,14 +357,15 @@ impl Problem {
     ) -> PyResult<Bound<'py, PyAny>> {
         use nonsmooth_problem::check::Judged;
         let file = self.file();
-        let point = self::point(&file.problem, point)?;
+        let point = self::point(&file.problem, "point", point)?;
+        Limits { tolerance, ..Limits::default() }.validate().map_err(mistake)?;
         let verdict = py.detach(|| file.problem.judge(&point, tolerance)).map_err(mistake)?;
         Ok(pythonize::pythonize(py, &verdict)?)
     }
 }
 
 /// A point of the problem: of an answer, of its parts by their names, or of the array that it is made of: z or x, of contacts the impulses r.
-pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoint> {
+pub fn point(problem: &AnyProblem, place: &str, given: &Bound<'_, PyAny>) -> PyResult<AnyPoint> {
     fn by_parts<P: Stated>(_: &P, parts: &Bound<'_, PyDict>) -> PyResult<AnyPoint> {
         let point = P::point_from_parts(|name| match parts.get_item(name)? {
             Some(given) => numbers::vector(name, &given),
@@ -362,11 +373,11 @@ pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoin
         })?;
         Ok(point.into())
     }
-    const PLACE: &str = "warm_start";
-    /// Those of a point of contacts; u follows from r.
-    const PARTS: [&str; 4] = ["r", "u", "v", "l"];
     if let Ok(answer) = given.cast::<crate::solve::Answer>() {
         return Ok(answer.get().answer.point.clone());
+    }
+    fn solution_of<P: Stated>(_: &P) -> &'static [&'static str] {
+        P::SOLUTION
     }
     let mut origin = problem.origin();
     let parts = given.cast::<PyDict>().ok();
@@ -376,7 +387,7 @@ pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoin
             None => Some(given.clone()).filter(|_| name == "r"),
         };
         if let Some(found) = found {
-            let place = if parts.is_some() { name } else { PLACE };
+            let place = if parts.is_some() { name } else { place };
             *into = match name {
                 "r" => numbers::of_contacts(place, &found, problem.kind().dimension())?,
                 _ => numbers::vector(place, &found)?,
@@ -384,13 +395,25 @@ pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoin
         }
         Ok(())
     };
-    if let (AnyProblem::Friction(_), Some(parts)) = (problem, parts) {
+    if let Some(parts) = parts {
+        let known = match (problem, &origin) {
+            // u follows from r.
+            (_, AnyPoint::Local(_)) => vec!["r", "u", "l"],
+            (_, AnyPoint::Global(_)) => vec!["r", "u", "v", "l"],
+            (AnyProblem::Complementarity(stated), _) => {
+                with_complementarity!(stated, p => solution_of(p)).to_vec()
+            }
+            (AnyProblem::Friction(_), _) => vec![],
+        };
         for key in parts.keys() {
             let key = key.str()?.to_string();
-            if !PARTS.contains(&key.as_str()) {
-                let what = format!("the parts {} of a point of contacts", PARTS.join(", "));
-                return Err(expected(PLACE, &what, key));
+            if !known.contains(&key.as_str()) {
+                let what = format!("the parts {} of a point", known.join(", "));
+                return Err(expected(place, &what, key));
             }
+        }
+        if matches!(problem, AnyProblem::Friction(_)) && !parts.contains("r")? {
+            return Err(expected("r", "this part of a point", "nothing"));
         }
     }
     match (problem, &mut origin) {
@@ -406,10 +429,10 @@ pub fn point(problem: &AnyProblem, given: &Bound<'_, PyAny>) -> PyResult<AnyPoin
         (AnyProblem::Complementarity(stated), point) => match parts {
             Some(parts) => *point = with_complementarity!(stated, p => by_parts(p, parts))?,
             None => {
-                let all = numbers::vector(PLACE, given)?;
+                let all = numbers::vector(place, given)?;
                 if all.len() != problem.unknowns() {
                     let what = format!("{} numbers", problem.unknowns());
-                    return Err(expected(PLACE, &what, all.len()));
+                    return Err(expected(place, &what, all.len()));
                 }
                 *point = problem.assembled(&all);
             }

@@ -5,10 +5,11 @@ use nonsmooth_solve::SolveError;
 use nonsmooth_solve::registry::{self, About, Prefix, Registered};
 use nonsmooth_solve::settings::SettingsMap;
 use pyo3::prelude::*;
+use pyo3::types::{PyDict, PyList, PyTuple};
 use pythonize::{depythonize, pythonize};
 use serde_json::{Value, json};
 
-use crate::mistake;
+use crate::{expected, mistake};
 
 fn offer<P: Registered + OfAny>() -> Value {
     let abouts: Vec<&About> = registry::abouts::<P>();
@@ -28,10 +29,40 @@ pub fn offers(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     Ok(pythonize(py, &all)?)
 }
 
+/// Values within values: one that is a part of itself has no end.
+const DEEPEST: usize = 64;
+
 /// Settings from a dictionary.
 pub fn settings(given: &Bound<'_, PyAny>) -> PyResult<SettingsMap> {
-    depythonize(given)
-        .map_err(|e| mistake(format!("settings: expected names with values, found: {e}")))
+    let mut settings = SettingsMap::new();
+    for (key, value) in given.cast::<PyDict>()? {
+        let key: String = key.extract()?;
+        let set = setting(&value, DEEPEST);
+        let set = set.map_err(|found| expected(&key, "a value of a setting", found))?;
+        settings.insert(key, set);
+    }
+    Ok(settings)
+}
+
+/// The value of a setting, or what it is that is none.
+fn setting(given: &Bound<'_, PyAny>, left: usize) -> Result<Value, String> {
+    let Some(left) = left.checked_sub(1) else { return Err("one that is too deep".into()) };
+    if let Ok(list) = given.cast::<PyList>() {
+        return list.iter().map(|one| setting(&one, left)).collect();
+    }
+    if let Ok(tuple) = given.cast::<PyTuple>() {
+        return tuple.iter().map(|one| setting(&one, left)).collect();
+    }
+    if let Ok(all) = given.cast::<PyDict>() {
+        let one = |(key, value): (Bound<'_, PyAny>, Bound<'_, PyAny>)| {
+            let key: String = key.extract().map_err(|_| format!("the name {key}"))?;
+            Ok((key, setting(&value, left)?))
+        };
+        return all.iter().map(one).collect::<Result<_, _>>().map(Value::Object);
+    }
+    let value: Value = depythonize(given).map_err(|_| given.to_string())?;
+    // Numbers that are none have no other form.
+    if value.is_null() && !given.is_none() { Err(given.to_string()) } else { Ok(value) }
 }
 
 /// Refuses settings that no kind of problem has for the solver of this name, or that are out of range.

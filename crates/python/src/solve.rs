@@ -12,6 +12,7 @@ use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::{AnyProblem, Problem as _};
 use nonsmooth_solve::{Kept, Limit, Limits, Solve, SolveError, Status, guard};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use pythonize::pythonize;
@@ -65,15 +66,17 @@ fn here(
     how: &Solve,
     problem: &AnyProblem,
     kept: &mut Kept,
-    watcher: &Watcher,
+    watcher: &Arc<Watcher>,
     callback: Option<&Py<PyAny>>,
 ) -> Solved {
     let mut looked = Instant::now();
-    how.again(problem, kept, &mut |progress| {
-        if callback.is_some() || looked.elapsed() >= TICK {
-            ask(watcher, |py| called(py, callback, Some(progress)));
-            looked = Instant::now();
-        }
+    watcher.at_work(|| {
+        how.again(problem, kept, &mut |progress| {
+            if callback.is_some() || looked.elapsed() >= TICK {
+                ask(watcher, |py| called(py, callback, Some(progress)));
+                looked = Instant::now();
+            }
+        })
     })
 }
 
@@ -82,18 +85,20 @@ fn there(
     how: Solve,
     file: Arc<ProblemFile>,
     mut kept: Kept,
-    watcher: &Watcher,
+    watcher: &Arc<Watcher>,
     callback: Option<&Py<PyAny>>,
 ) -> (Solved, Kept) {
-    let told = callback.is_some();
+    let (told, mine) = (callback.is_some(), watcher.clone());
     let hear = |news: Option<nonsmooth_solve::Progress>| {
         ask(watcher, |py| called(py, callback, news.as_ref()));
     };
     elsewhere(hear, move |say| {
-        let solved = how.again(&file.problem, &mut kept, &mut |progress| {
-            if told {
-                say(*progress);
-            }
+        let solved = mine.at_work(|| {
+            how.again(&file.problem, &mut kept, &mut |progress| {
+                if told {
+                    say(*progress);
+                }
+            })
         });
         (solved, kept)
     })
@@ -117,7 +122,8 @@ pub fn solve(
 ) -> PyResult<Answer> {
     let problem = problem.get();
     let file = problem.file();
-    let watcher = Arc::new(Watcher::default());
+    let small = file.problem.unknowns() <= guard::SMALL;
+    let watcher = Arc::new(if small { Watcher::default() } else { Watcher::elsewhere(py)? });
     // As the command line has it: a limit on time is the only one where there is one.
     let most = if time_limit.is_some() { usize::MAX } else { Limits::default().max_iterations };
     let limits = Limits {
@@ -133,11 +139,10 @@ pub fn solve(
         how = how.settings(registry::settings(given)?);
     }
     if let Some(start) = warm_start {
-        how = how.warm(&point(&file.problem, start)?);
+        how = how.warm(&point(&file.problem, "warm_start", start)?);
     }
     let mut kept = problem.take_kept();
     let watching = problem.faults.watch(&watcher);
-    let small = file.problem.unknowns() <= guard::SMALL;
     let (solved, kept) = py.detach(|| match small {
         true => {
             let solved = here(&how, &file.problem, &mut kept, &watcher, callback.as_ref());
@@ -148,6 +153,10 @@ pub fn solve(
     drop(watching);
     problem.put_kept(kept);
     if let Some(fault) = watcher.fault() {
+        // What Ctrl-C ended is not lost.
+        if let (true, Ok(answer)) = (fault.is_instance_of::<PyKeyboardInterrupt>(py), solved) {
+            fault.value(py).setattr("answer", Bound::new(py, Answer { answer, file })?)?;
+        }
         return Err(fault);
     }
     let answer = solved.map_err(mistake)?;

@@ -38,6 +38,9 @@ def test_profiles_are_those_of_the_library(runs):
     assert profile.plot().get_ylabel() == "share of problems solved"
     with pytest.raises(ns.Error, match="cost: expected one of seconds, iterations, factorisations"):
         runs.profile("money")
+    with pytest.raises(ns.Error, match="kind: expected a kind of the runs .friction_local_3d., found 'foo'"):
+        runs.profile(kind="foo")
+    assert len(ns.bench([local(3)], "nsgs", repeats=0)) == 1
 
 
 def test_files_of_runs(runs, tmp_path):

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import contextvars
+import threading
+import time
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -181,3 +185,111 @@ def test_where_a_function_fails_the_judge_looks_in_vain():
     # Near zero only the judge asks: no step of Newton's from 50 comes there.
     answer = ns.solve(ns.MCP(F, [50.0], lower=-np.inf, pattern=[[1]]))
     assert answer.x == pytest.approx([math.log(2)], abs=1e-6) and 0 < min(asked) < 1e-4
+
+
+@pytest.mark.parametrize("n", [3, 400])
+def test_nothing_is_called_after_what_was_raised(n):
+    calls = failing = 0
+
+    def F(x):
+        nonlocal calls
+        calls += 1
+        if failing and calls == 2:
+            raise ZeroDivisionError("by nothing")
+        return x**3 + x - 2
+
+    problem = ns.MCP(F, np.zeros(n), jac=lambda x: sp.diags(3 * x**2 + 1).tocsr())
+    calls, failing = 0, 1
+    with pytest.raises(ZeroDivisionError, match="by nothing"):
+        ns.solve(problem)
+    assert calls == 2
+
+
+def test_what_is_raised_in_one_thread_is_raised_there():
+    n = 3
+
+    def F(x):
+        if names.get() == "bad":
+            raise ZeroDivisionError("by nothing")
+        time.sleep(0.01)
+        return x**3 + x - 2
+
+    names = contextvars.ContextVar("names", default="")
+    problem = ns.MCP(F, np.zeros(n), jac=lambda x: sp.diags(3 * x**2 + 1).tocsr())
+    came = {}
+
+    def run(name):
+        names.set(name)
+        try:
+            came[name] = ns.solve(problem).solved
+        except ZeroDivisionError as fault:
+            came[name] = str(fault)
+
+    threads = [threading.Thread(target=run, args=(name,)) for name in ("good", "bad")]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert came == {"good": True, "bad": "by nothing"}
+
+
+@pytest.mark.parametrize("n", [3, 400])
+def test_functions_run_in_the_context_of_the_solve(n):
+    seen = set()
+
+    def F(x):
+        seen.add(np.geterr()["divide"])
+        return x**3 + x - 2
+
+    problem = ns.MCP(F, np.zeros(n), jac=lambda x: sp.diags(3 * x**2 + 1).tocsr())
+    with np.errstate(divide="raise"):
+        seen.clear()
+        assert ns.solve(problem).solved
+    assert seen == {"raise"}
+
+
+def test_shapes_are_looked_at_before_memory_is_taken():
+    n = 40_000
+    with pytest.raises(ns.Error, match=r"jac\(x\): expected 40000 × 40000 .*, found 2 × 2"):
+        ns.MCP(lambda x: x, np.zeros(n), jac=lambda x: np.zeros((2, 2)))
+    for shape in ((3, 2), (3, 0), (2, 3)):
+        with pytest.raises(ns.Error, match="pattern: expected 3 × 3 "):
+            ns.MCP(lambda x: x**3 + x - 1, np.zeros(3), pattern=np.ones(shape))
+
+
+def test_a_full_pattern_is_found_in_few_calls():
+    calls, n = 0, 300
+    A = np.random.default_rng(0).normal(size=(n, n)) / n
+
+    def F(x):
+        nonlocal calls
+        calls += 1
+        return x**3 + A @ x - 1
+
+    problem = ns.MCP(F, np.zeros(n))
+    assert calls < 3 * n
+    assert ns.solve(problem).solved
+
+
+def test_sets_and_settings_within_themselves_are_refused():
+    inner = []
+    product = ns.Product(inner)
+    inner.append(product)
+    with pytest.raises(ns.Error, match="products at most 64 deep"):
+        ns.VI(lambda x: x, product, [0.0, 0.0])
+    deep = ns.Ball([0, 0, 0], 1)
+    for _ in range(10_000):
+        deep = ns.Product([deep])
+    with pytest.raises(ns.Error, match="products at most 64 deep"):
+        ns.VI(lambda x: x, deep, [0.0, 0.0, 0.0])
+    endless = []
+    endless.append(endless)
+    with pytest.raises(ns.Error, match="omega: expected a value of a setting, found one that is too deep"):
+        ns.Nsgs(omega=endless)
+    for bad, said in ((np.nan, "omega: .* found nan"), (object(), "omega: .* found <object")):
+        with pytest.raises(ns.Error, match=said):
+            ns.Nsgs(omega=bad)
+    with pytest.raises(ns.Error, match="set.dimension: expected a whole number of at least 0, found -1"):
+        ns.VI(lambda x: x, ns.SecondOrderCone(-1), [0.0])
+    with pytest.raises(ns.Error, match="set.radius: expected a number, found 'a'"):
+        ns.VI(lambda x: x, ns.Ball([0, 0], "a"), [0.0, 0.0])

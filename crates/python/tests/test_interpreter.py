@@ -150,11 +150,16 @@ def test_ctrl_c_is_prompt(contacts):
 
     thread = threading.Thread(target=press)
     thread.start()
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as caught:
         while True:
             ns.solve(problem, "nsgs", tol=1e-300, max_iter=10**9)
     late = time.perf_counter() - pressed[0]
     thread.join()
+    # What was computed is not lost. A small problem may be solved before Ctrl-C is looked for.
+    if contacts == 400:
+        answer = caught.value.answer
+        assert answer.status == ns.Status.CANCELLED and answer.residual < 0.5
+        assert problem.judge(answer)["measure"]["relative"] == answer.residual
     print(f"Ctrl-C: {1e3 * late:.0f} ms")
     assert late < SLACK * 0.25
     assert ns.solve(problem, max_iter=10).iterations <= 10

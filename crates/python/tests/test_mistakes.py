@@ -104,6 +104,7 @@ def test_layouts_of_arrays_are_taken(layout):
         ([[1.0, 2.0, 3.0]], "warm_start"),
         ([np.nan, 0.0, 0.0], "finite"),
         (dict(w=[1.0, 2.0, 3.0]), "z: expected this part"),
+        (dict(z=[1.0, 2.0, 3.0], zz=3), "warm_start: expected the parts z, w of a point, found zz"),
         ("here", "warm_start: expected an array of real numbers"),
     ],
 )
@@ -237,7 +238,7 @@ def test_points_have_the_shape_and_the_parts_of_the_problem():
         with pytest.raises(ns.Error, match="components for each contact, found rows of"):
             wrong()
     for point in ({"R": np.zeros(12)}, {"r": np.zeros(12), "rr": np.zeros(12)}):
-        with pytest.raises(ns.Error, match="expected the parts r, u, v, l"):
+        with pytest.raises(ns.Error, match="expected the parts r, u, l of a point"):
             problem.judge(point)
     answer = ns.solve(problem)
     assert ns.solve(problem, warm_start=answer.parts).solved
@@ -311,3 +312,33 @@ def test_arguments_are_named(call, said):
 def test_whole_numbers_may_be_written_as_floats():
     assert ns.solve(ONE, max_iter=1e3, threads=np.int64(1)).solved
     assert ns.solve(ONE, max_iter=10**30, time_limit=np.float32(5.0)).solved
+
+
+def test_points_are_looked_at_whole():
+    contact = ns.Friction(W=EYE, q=[-1.0, 2.0, 1.5], mu=0.5)
+    for point, said in (
+        ({"u": [0.0, 0.0, 0.0]}, "r: expected this part"),
+        ({}, "r: expected this part"),
+        ({"r": np.ones(3), "v": 3}, "point: expected the parts r, u, l of a point, found v"),
+        (None, "point: expected"),
+    ):
+        with pytest.raises(ns.Error, match=said):
+            contact.judge(point)
+    for tol in (np.inf, -1.0, np.nan, 0.0):
+        with pytest.raises(ns.Error, match="tol"):
+            contact.judge(np.ones(3), tol)
+
+
+def test_wrong_objects_are_named():
+    scene = ns.World()
+    for make, said in (
+        (lambda: ns.Simulation("a.toml"), "world: expected a nonsmooth.World"),
+        (lambda: ns.draw(None), "scene: expected a nonsmooth.World"),
+        (lambda: ns.Proximal(None), "solver: expected a name or an object of settings"),
+        (lambda: ns.bench({}).profile(), "kind: expected a kind of the runs"),
+    ):
+        with pytest.raises(ns.Error, match=said):
+            make()
+    with pytest.raises(TypeError, match="expected one of its kinds"):
+        ns.Problem()
+    assert scene.copy() is not scene

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -276,3 +279,31 @@ def test_rolling_friction_has_five_rows_a_contact() -> None:
         ns.Friction(M=M, H=H, f=f, w=np.zeros(5), mu=0.5, mu_r=-1.0)
     with pytest.raises(ns.Error, match="5 for each"):
         ns.Friction(W=np.eye(3), q=np.zeros(3), mu=0.5, mu_r=0.1)
+
+
+def test_copies_are_problems_of_their_own():
+    problem = ns.Friction(W=W, q=Q, mu=0.4)
+    for copied in (copy.copy(problem), copy.deepcopy(problem)):
+        copied.update(mu=0.0)
+        np.testing.assert_array_equal(copied.mu, [0.0, 0.0])
+        np.testing.assert_array_equal(problem.mu, [0.4, 0.4])
+        assert type(copied) is ns.Friction and ns.solve(copied).solved
+    with pytest.raises(TypeError, match="save"):
+        pickle.dumps(problem)
+
+
+def test_settings_take_numbers_of_numpy():
+    assert ns.Nsgs(seed=np.int64(3)) == ns.Nsgs(seed=3)
+    assert ns.Proximal("nsgs", seed=np.int64(3)).settings == {"seed": 3}
+    changed = ns.Nsgs()
+    changed.omega = np.float32(0.5)
+    assert changed == ns.Nsgs(omega=0.5)
+
+
+def test_parts_of_answers_stay_as_they_are():
+    answer = ns.solve(ns.Friction(W=W, q=Q, mu=0.4))
+    with pytest.raises(ValueError, match="read-only"):
+        answer.r[0] = 1.0
+    assert type(answer.contacts["r_n"]) is np.ndarray
+    with pytest.raises(AttributeError, match="contacts: expected a problem of contacts, found lcp"):
+        ns.solve(ns.LCP(spd(3), -np.ones(3))).contacts

@@ -101,9 +101,13 @@ pub(crate) fn run<S: Driven>(
 ) -> Result<RunReport, SimulateError> {
     require(|| "h".into(), h, h > 0.0, "a positive number")?;
     require(|| "until".into(), until, true, "a finite time")?;
+    let counted = h > f64::EPSILON * until.abs();
+    require(|| "h".into(), h, counted, "a step that moves the time, above 2.3e-16 of it")?;
     let mut run = RunReport { t: simulation.time(), ..RunReport::default() };
     // What is left of the last step up to the rounding of the sum that time is is no step: t/h terms, each rounded by ε t.
-    let rounding = (f64::EPSILON * until * until / h).clamp(1e-9 * h, 1e-3 * h);
+    let summed = f64::EPSILON * until.abs() * (until.abs() / h).max(4.0);
+    let shortest = h.min(until - simulation.time()).max(summed);
+    let rounding = summed.clamp(1e-9 * shortest, 1e-3 * shortest);
     while simulation.time() < until - rounding {
         if is_cancelled(simulation.limits()) {
             run.stopped = true;

@@ -80,6 +80,12 @@ impl EnergyBalance {
         if self.scale > 0.0 { self.imbalance.abs() / self.scale } else { 0.0 }
     }
 
+    /// Whether the energies of motion and weight, and the works, are numbers: squares leave the range of double precision before velocities do.
+    pub(crate) fn is_finite(&self) -> bool {
+        let Self { kinetic, potential, imbalance, scale, .. } = *self;
+        [kinetic, potential, imbalance, scale].iter().all(|x| x.is_finite())
+    }
+
     /// The sum of two steps, the second of which follows the first.
     pub(crate) fn then(self, next: Self) -> Self {
         Self {

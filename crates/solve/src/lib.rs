@@ -8,7 +8,7 @@
 //! | room | what |
 //! | --- | --- |
 //! | [`contact`] | frictional contact: the law, forms of the problem, families of methods |
-//! | [`complementarity`] | linear complementarity problems: functions, forms, families of methods, reformulations |
+//! | [`complementarity`] | complementarity problems, linear and nonlinear: functions, forms, families of methods, reformulations |
 //! | [`bridges`] | from contact to complementarity: facets, and friction as a nonlinear problem |
 //! | [`variational`] | variational inequalities over simple sets: projection methods, multipliers |
 //! | `core` | what the wings stand on: the contract of a solver, the loop, settings, the shape of the registry |

@@ -63,6 +63,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     files::writable("--out", &args.out)?;
     super::apart(std::iter::once(&args.file).chain(&args.problems), &args.out)?;
+    files::ends_in("--out", &args.out, &["jsonl"])?;
     let measure = args.error.map(|e| match e {
         Error::Siconos => Measure::Siconos,
         Error::Literature => Measure::Literature,

@@ -30,6 +30,7 @@ Exit codes: 0 joined; 1 joined, but parts are missing or plans differ; 2 some fi
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     super::apart(&args.files, &args.out)?;
+    files::ends_in("--out", &args.out, &["jsonl"])?;
     files::writable("--out", &args.out)?;
     let Joined { runs, twice, mut exit } = super::read(&args.files)?;
     let mut text = format!(

@@ -99,6 +99,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if inputs.is_empty() {
         return Err("expected problems, found none".into());
     }
+    output::results_are_filed();
     let program = format!("{} {}", "nonsmooth", env!("CARGO_PKG_VERSION"));
     let now =
         std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).unwrap_or_default();

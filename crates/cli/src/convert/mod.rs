@@ -70,6 +70,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             let found = read.problem.kind().name();
             let (content, how) = rewritten(read).ok_or_else(|| {
                 let expected = "expected a problem vi over boxes and polyhedra";
+                let found = if found == "vi" { "vi over other sets" } else { found };
                 format!("{}: --as-mcp: {expected}, found {found}", from.display())
             })?;
             let format = format_of(&content)?;

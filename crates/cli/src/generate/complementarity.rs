@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use nonsmooth_io::{Info, ProblemFile, StoredPoint};
+use nonsmooth_linalg::budget;
 use nonsmooth_problem::planted::{
     BallsAndCones, Bratu, HarkerPang, JournalBearing, NashCournot, NonlinearClassic, Obstacle,
     PendulumStep, PlantedLcp, PlantedMlcp, Recipe, Torsion, Traffic,
@@ -30,29 +31,37 @@ pub const MAKERS: &[Maker] = &[
         name: "lcp",
         summary: "an LCP of a class of matrices, with a planted solution",
         settings: described::<Of<PlantedLcp>>,
-        make: |s| Ok(solved(recipe::<PlantedLcp>(s)?.lcp())),
+        make: |s| Ok(solved(planted(s)?.lcp())),
     },
     Maker {
         name: "box_lcp",
         summary: "an LCP with two bounds, with a planted solution",
         settings: described::<Of<PlantedLcp>>,
-        make: |s| Ok(solved(recipe::<PlantedLcp>(s)?.boxed())),
+        make: |s| Ok(solved(planted(s)?.boxed())),
     },
     Maker {
         name: "hlcp",
         summary: "a horizontal LCP, with a planted solution",
         settings: described::<Of<PlantedLcp>>,
-        make: |s| Ok(solved(recipe::<PlantedLcp>(s)?.hlcp())),
+        make: |s| Ok(solved(planted(s)?.hlcp())),
     },
     Maker {
         name: "infeasible",
         summary: "an LCP without a solution: of a class psd, kkt or copositive_plus",
-        settings: described::<Of<PlantedLcp>>,
+        settings: || {
+            let mut all = described::<Of<PlantedLcp>>();
+            if let Some(class) = all.iter_mut().find(|setting| setting.key == "class") {
+                (class.default, class.choices) =
+                    (INFEASIBLE[0].into(), INFEASIBLE.map(Into::into).into());
+            }
+            all
+        },
         make: |s| {
-            let planted = recipe::<PlantedLcp>(s)?;
+            let mut s = s.clone();
+            let class = s.entry("class").or_insert(INFEASIBLE[0].into()).clone();
+            let planted = planted(&s)?;
             let (problem, _) = planted.infeasible().ok_or_else(|| {
-                let found = serde_json::json!(planted.class);
-                format!("class: expected psd, kkt or copositive_plus, as others have solutions, found {found}")
+                format!("class: expected psd, kkt or copositive_plus, as others have solutions, found {class}")
             })?;
             Ok(ProblemFile::new(problem))
         },
@@ -61,7 +70,11 @@ pub const MAKERS: &[Maker] = &[
         name: "mlcp",
         summary: "a mixed LCP, with a planted solution",
         settings: described::<Of<PlantedMlcp>>,
-        make: |s| Ok(solved(recipe::<PlantedMlcp>(s)?.mlcp())),
+        make: |s| {
+            let made = recipe::<PlantedMlcp>(s)?;
+            fits(made.free + made.pairs, made.density)?;
+            Ok(solved(made.mlcp()))
+        },
     },
     Maker {
         name: "obstacle",
@@ -136,6 +149,30 @@ pub const MAKERS: &[Maker] = &[
         },
     },
 ];
+
+/// The classes of which there are problems without a solution.
+const INFEASIBLE: [&str; 3] = ["psd", "kkt", "copositive_plus"];
+
+/// Bytes of an entry of a matrix that is being made: its place and its value, and once more in the matrix.
+const ENTRY: f64 = 32.0;
+
+/// Refuses a matrix of n rows with this share of entries that the machine has no room for.
+fn fits(n: usize, share: f64) -> Result<(), String> {
+    let needed = ENTRY * share * (n as f64).powi(2);
+    match budget::fits(needed) {
+        true => Ok(()),
+        false => Err(format!(
+            "expected a matrix that fits in memory, found {n} × {n}, which take about {:.0} GB",
+            1e-9 * needed
+        )),
+    }
+}
+
+fn planted(settings: &SettingsMap) -> Result<PlantedLcp, String> {
+    let made = recipe::<PlantedLcp>(settings)?;
+    fits(made.n, made.density)?;
+    Ok(made)
+}
 
 impl Maker {
     /// The one called `name`.

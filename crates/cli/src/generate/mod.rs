@@ -44,7 +44,7 @@ pub struct Args {
         conflicts_with_all = ["settings", "form", "draw", "solve", "list"]
     )]
     suite: Option<PathBuf>,
-    /// Write the problem: FCLIB (HDF5); a complementarity problem as .toml, a linear one also as .mtx
+    /// Write the problem: FCLIB (HDF5); a complementarity problem as .toml or .nl, a linear one also as .mtx
     #[arg(long, value_name = "FILE", requires = "what")]
     out: Option<PathBuf>,
     /// State it with the velocities of the bodies (M, H, f, w), or at the contacts alone (W, q)

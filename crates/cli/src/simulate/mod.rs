@@ -168,7 +168,7 @@ fn stopped(path: &Path, as_json: bool) -> Exit {
     output::print(&match as_json {
         true => {
             let run = json!({
-                "scene": path, "status": "not_solved", "message": why, "steps": 0, "stopped": true,
+                "scene": path.to_string_lossy(), "status": "not_solved", "message": why, "steps": 0, "stopped": true,
             });
             format!("{run}\n")
         }
@@ -238,7 +238,8 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let csv = target(&args.csv, &scene.output.csv, &path);
     let vtk = target(&args.vtk, &scene.output.vtk, &path);
     if let Some(out) = &out {
-        files::ends_in("--out", out, TRAJECTORY)?;
+        let resumed = args.out.is_none() && args.resume.as_ref() == Some(out);
+        files::ends_in(if resumed { "--resume" } else { "--out" }, out, TRAJECTORY)?;
     }
     // A trajectory that is resumed goes on in its own file.
     let resumed =
@@ -302,34 +303,30 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let report = simulation.run(scene.time.end, scene.time.h, &mut observer).map_err(wrong)?;
     let unwritten = observer.mistake;
     drop(bar);
-    if let Some(mistake) = mistake.or(unwritten) {
-        return Err(mistake);
-    }
     let seconds = begun.elapsed().as_secs_f64();
-    let mut written = vec![];
+    // What cannot be written is no reason to lose the others, nor the report.
+    let (mut written, mut mistakes) = (vec![], vec![]);
+    mistakes.extend(unwritten);
+    let mut note = |path: &PathBuf, done: Result<(), String>| match done {
+        Ok(()) => written.push(path.clone()),
+        Err(e) => mistakes.push(e),
+    };
     if let Some(out) = &out {
-        recorder.finish(&simulation)?;
-        written.push(out.clone());
+        note(out, mistake.map_or_else(|| recorder.finish(&simulation), Err));
     }
     if let Some(csv) = &csv {
-        files::write_text("--csv", csv, &recorder.csv())?;
-        written.push(csv.clone());
+        note(csv, files::write_text("--csv", csv, &recorder.csv()));
     }
     if let Some(html) = &html {
-        files::write_text(
-            "--html",
-            html,
-            &record::page(&recorder.trajectory, &scene, simulation.world())?,
-        )?;
-        written.push(html.clone());
+        let page = record::page(&recorder.trajectory, &scene, simulation.world());
+        note(html, page.and_then(|page| files::write_text("--html", html, &page)));
     }
     if let Some(vtk) = &vtk {
-        record::paraview(vtk, &recorder.trajectory, simulation.world())?;
-        written.push(vtk.clone());
+        note(vtk, record::paraview(vtk, &recorder.trajectory, simulation.world()));
     }
     if let Some(svg) = &args.svg {
-        record::drawings(svg, &recorder.trajectory, &scene, simulation.world())?;
-        written.push(svg.clone());
+        let drawn = record::drawings(svg, &recorder.trajectory, &scene, simulation.world());
+        note(svg, drawn);
     }
     let run = said::Run {
         path: &path,
@@ -345,7 +342,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         true => output::print(&format!("{}\n", run.json())),
         false => output::print(&run.text(args.timings)),
     }
-    Ok(Exit::solved(complete(&report)))
+    match mistakes.is_empty() {
+        true => Ok(Exit::solved(complete(&report))),
+        false => Err(mistakes.join("; ")),
+    }
 }
 
 /// The time between two flushes.

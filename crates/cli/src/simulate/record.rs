@@ -179,7 +179,14 @@ pub fn drawings(
     };
     let frames = trajectory.frames.len();
     match is_folder(path) {
-        true => (0..frames).try_for_each(|k| draw(k, &path.join(format!("frame-{k:06}.svg")))),
+        true => {
+            let name = |k: usize| path.join(format!("frame-{k:06}.svg"));
+            (0..frames).try_for_each(|k| draw(k, &name(k)))?;
+            // Frames of a longer run that was there before belong to another film.
+            (frames..).map(name).take_while(|old| old.exists()).try_for_each(|old| {
+                std::fs::remove_file(&old).map_err(|e| format!("--svg {}: {e}", old.display()))
+            })
+        }
         false => draw(frames.saturating_sub(1), path),
     }
 }

@@ -143,7 +143,7 @@ impl Run<'_> {
         let Self { report, simulation, .. } = self;
         let last = self.recorder.trajectory.steps.last();
         json!({
-            "scene": self.path,
+            "scene": self.path.to_string_lossy(),
             "name": self.scene.name,
             "bodies": simulation.world().bodies.len(),
             "status": if super::complete(report) { "solved" } else { "not_solved" },
@@ -164,7 +164,7 @@ impl Run<'_> {
             "seconds": self.seconds,
             "kinetic": last.map(|s| s.energy.kinetic),
             "potential": last.map(|s| s.energy.potential),
-            "written": self.written,
+            "written": self.written.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(),
         })
     }
 }

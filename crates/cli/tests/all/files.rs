@@ -94,6 +94,22 @@ fn what_is_read_or_written_already_is_not_written_over() {
             "--out others.jsonl: expected a file name that ends in .md",
         ),
         ("play ball.h5 --glb run.gltf", "--glb run.gltf: expected a file name that ends in .glb"),
+        (
+            "solve none.toml --solver lemke --trace ball.h5",
+            "--trace ball.h5: expected a file name that ends in .json",
+        ),
+        (
+            "solve none.toml --solver lemke --certificate ball.h5",
+            "--certificate ball.h5: expected a file name that ends in .json",
+        ),
+        (
+            "exists wall.hdf5 --certificate ball.h5",
+            "--certificate ball.h5: expected a file name that ends in .json",
+        ),
+        (
+            "bench merge runs.jsonl --out ball.h5",
+            "--out ball.h5: expected a file name that ends in .jsonl",
+        ),
     ] {
         folder.run(command).refused(&[expected]);
         assert!(content(&folder) == before, "{command}");

@@ -136,8 +136,7 @@ fn problems_are_generated_with_the_solution_planted() {
     for (name, kind) in
         [("obstacle", "lcp"), ("torsion", "box_lcp"), ("bearing", "lcp"), ("infeasible", "lcp")]
     {
-        let more = if name == "infeasible" { " --set class=psd" } else { "" };
-        let text = folder.run(&format!("gen {name}{more} --out {name}.toml")).exits(0).stdout;
+        let text = folder.run(&format!("gen {name} --out {name}.toml")).exits(0).stdout;
         assert!(text.contains(kind), "{text}");
         folder.run(&format!("check {name}.toml")).refused(&["[solution]"]);
     }
@@ -148,7 +147,9 @@ fn problems_are_generated_with_the_solution_planted() {
         ("gen lcp --form local --out a.toml", ["--form", "lcp"]),
         ("gen lcp --set n=1 --out a.toml", ["n: expected from 2", "found 1"]),
         ("gen lcp --set class=q --out a.toml", ["class", "spd"]),
-        ("gen infeasible --out a.toml", ["class", "psd, kkt or copositive_plus"]),
+        ("gen lcp --set n=1000000 --out a.toml", ["fits in memory", "1000000 × 1000000"]),
+        ("gen mlcp --set pairs=1000000 --out a.toml", ["fits in memory", "GB"]),
+        ("gen infeasible --set class=spd --out a.toml", ["class", "psd, kkt or copositive_plus"]),
         ("gen magic --out a.toml", ["magic", "complementarity: lcp"]),
     ] {
         folder.run(arguments).refused(&parts);

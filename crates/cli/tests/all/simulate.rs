@@ -217,6 +217,70 @@ fn scenes_are_explained() {
 }
 
 #[test]
+fn energies_beyond_the_range_of_numbers_are_no_solution() {
+    let folder = folder();
+    for changed in ["gravity=[0,0,-1e170]", "bodies[1].velocity=[0,0,-1e308]"] {
+        let run = folder.run(&format!("simulate box.toml --end 0.02 --set {changed} --json"));
+        let json: Value = serde_json::from_str(&run.exits(1).stdout).unwrap();
+        assert_eq!(json["status"], "not_solved", "{changed}");
+        assert_eq!(json["statuses"]["not_finite"], 1, "{changed}");
+    }
+}
+
+#[test]
+fn a_step_longer_than_the_run_is_shortened() {
+    let folder = folder();
+    for h in ["1e3", "1e300"] {
+        let run = folder.run(&format!("simulate box.toml --end 0.002 --set time.h={h} --json"));
+        let json: Value = serde_json::from_str(&run.exits(0).stdout).unwrap();
+        assert_eq!((&json["steps"], &json["t"]), (&1.into(), &0.002.into()), "{h}");
+    }
+    let run = folder.run("simulate box.toml --end 0.2 --set time.h=1e-20");
+    run.refused(&["h: expected a step that moves the time"]);
+}
+
+#[test]
+fn frames_of_a_longer_run_do_not_stay() {
+    let folder = folder();
+    let frames = || std::fs::read_dir(folder.path("film")).unwrap().count();
+    folder.run("simulate box.toml --end 0.01 --svg film/").exits(0);
+    assert_eq!(frames(), 11);
+    folder.run("simulate box.toml --end 0.003 --svg film/").exits(0);
+    assert_eq!(frames(), 4);
+}
+
+#[test]
+#[cfg(unix)]
+fn names_that_are_no_text_and_files_that_cannot_be_written_cost_no_report() {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    let folder = folder();
+    let name = OsStr::from_bytes(b"b\xfex.toml");
+    std::fs::write(folder.as_ref().join(name), BOX).unwrap();
+    for (more, code) in [(vec!["--end", "0.01"], 0), (vec!["--time-limit", "0"], 1)] {
+        let run = folder.command().arg("simulate").arg(name).args(more).arg("--json").output();
+        let json: Value =
+            serde_json::from_str(&crate::common::Run::from(run.unwrap()).exits(code).stdout)
+                .unwrap();
+        assert_eq!(json["scene"], "b\u{fffd}x.toml");
+    }
+
+    // A disk that is full for one of the files: writing beyond the limit fails in place of killing.
+    let program = env!("CARGO_BIN_EXE_nonsmooth");
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 76; exec {program} simulate box.toml --end 0.2 --every 1 --out big.h5 --csv small.csv"
+    );
+    let run = std::process::Command::new("sh").args(["-c", &script]).current_dir(&folder).output();
+    let run = crate::common::Run::from(run.unwrap());
+    assert_eq!(run.code, Some(2), "{}{}", run.stdout, run.stderr);
+    assert!(run.stderr.starts_with("error: --out big.h5"), "{}", run.stderr);
+    assert!(run.stdout.contains("every one of 200 steps solved"), "{}", run.stdout);
+    let table = std::fs::read_to_string(folder.path("small.csv")).unwrap();
+    assert_eq!(table.lines().count(), 201);
+}
+
+#[test]
 fn mistakes_are_one_line() {
     let folder = folder();
     std::fs::write(folder.path("broken.toml"), "bodies = [").unwrap();

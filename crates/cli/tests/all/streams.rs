@@ -20,6 +20,23 @@ fn a_reader_that_goes_away_is_no_catastrophe() {
 }
 
 #[test]
+fn what_goes_to_files_needs_no_reader() {
+    let folder = Folder::with_problems();
+    let program = env!("CARGO_BIN_EXE_nonsmooth");
+    for (command, written) in [
+        ("solve wall.hdf5 box.hdf5 --out solved/", vec!["solved/wall.hdf5", "solved/box.hdf5"]),
+        ("bench run wall.hdf5 --solver nsgs --repeats 0 --out runs.jsonl", vec!["runs.jsonl"]),
+    ] {
+        let script = format!("{program} {command} | true");
+        let run = Command::new("sh").args(["-c", &script]).current_dir(&folder).output();
+        assert_eq!(Run::from(run.unwrap()).stderr, "", "{command}");
+        assert!(written.iter().all(|name| folder.path(name).exists()), "{command}");
+    }
+    let runs = std::fs::read_to_string(folder.path("runs.jsonl")).unwrap();
+    assert!(runs.contains("\"ending\":\"solved\""), "{runs}");
+}
+
+#[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_reported() {
     let folder = Folder::new();

@@ -1,13 +1,19 @@
 //! The pattern of a Jacobian, found by probing: which rows change with which columns.
 //!
 //! Blocks of columns are halved; of each half it is asked which rows see it, for all halves at once of which no row can see two. Of a pattern with k places a
-//! row this takes some `k log₂ n` probes, of a full one 2n.
+//! row this takes some `k log₂ n` probes. Where at [`FULL`] blocks a row still sees all of them, n differences would be needed for a Jacobian anyway: the pattern is then taken to be full,
+//! unless that is too large ([`MOST`]).
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::Pattern;
 use super::groups::Groups;
+
+/// So many blocks of which some row sees all.
+const FULL: usize = 64;
+/// The most rows of a pattern that is taken to be full.
+const MOST: usize = 2000;
 
 /// What a probe says of a row and a set of columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -54,6 +60,9 @@ pub(super) fn probed(
             rows.iter().map(|row| row.iter().flat_map(|&b: &usize| starts[b]..starts[b + 1])),
         );
         let groups = Groups::of(&may, halves.len());
+        if groups.columns.len() == halves.len() && halves.len() >= FULL && n <= MOST {
+            return Pattern::dense(n);
+        }
         let mut next = vec![vec![]; n];
         for (first, some) in groups.columns.chunks(lanes).enumerate() {
             let columns = |group: &Vec<usize>| {

@@ -55,6 +55,13 @@ class Unsolved(RuntimeError):
 class Table(np.ndarray[Any, np.dtype[np.void]]):
     """A structured array: a row for each contact or variable, columns by name."""
 
+    def __getitem__(self, key: Any) -> Any:
+        found = super().__getitem__(key)
+        # A column is an array like any other.
+        if isinstance(found, Table) and found.dtype.names is None:
+            return found.view(np.ndarray)
+        return found
+
     def to_pandas(self) -> pandas.DataFrame:
         """The same as a DataFrame; of a column with several components a column for each: ``r_0``, ``r_1``, ``r_2``."""
         import pandas
@@ -87,7 +94,7 @@ class Answer:
     """What came of a solve: the best point found, whatever stopped it, and the judge's word on it.
 
     The parts of the point are attributes: ``r``, ``u`` (of global problems ``v`` too) and the multipliers ``l`` of contacts; ``z`` and ``w``, or ``x`` and
-    ``F``, of complementarity problems.
+    ``F``, of complementarity problems. They are not to be written to; take a copy.
     """
 
     def __init__(self, native: _nonsmooth.Answer) -> None:
@@ -135,8 +142,11 @@ class Answer:
 
     @cached_property
     def parts(self) -> dict[str, Vector]:
-        """The parts of the point by name."""
-        return self._native.parts()
+        """The parts of the point by name: arrays that are not to be written to."""
+        parts = self._native.parts()
+        for part in parts.values():
+            part.flags.writeable = False
+        return parts
 
     @cached_property
     def residuals(self) -> dict[str, float]:
@@ -187,6 +197,9 @@ class Answer:
     def __getattr__(self, name: str) -> Vector:
         if name.startswith("_"):
             raise AttributeError(name)
+        if name == "contacts":
+            # What the property raised is lost on the way here.
+            raise AttributeError(f"contacts: expected a problem of contacts, found {self._native.kind}")
         if name not in self.parts:
             parts = ", ".join(self.parts)
             raise AttributeError(f"Answer: expected one of the parts {parts}, found {name}")
@@ -240,7 +253,9 @@ def solve(
     ``callback`` is called after each step (of a large problem now and then) with a :class:`Progress`; if it returns something true, the solve
     ends with the best point so far; what it raises is raised here.
 
-    The GIL is released. Ctrl-C raises KeyboardInterrupt. Raises :class:`Error` for what is a mistake; that there is no solution, or that none was found, is a status.
+    The GIL is released. Ctrl-C raises KeyboardInterrupt, with the best point so far as its attribute ``answer``. Functions of the problem run in the present
+    context (``contextvars``, ``numpy.errstate``), of large problems on another thread. What they raise ends the solve and is raised here, but where F is
+    only asked whether it is defined (a step that may leave its domain): there it is the answer that it is not. Raises :class:`Error` for what is a mistake; that there is no solution, or that none was found, is a status.
     """
     name, own = arguments.named(solver)
     every = {**own, **registered(settings)} if settings else own
@@ -250,7 +265,7 @@ def solve(
         native = _nonsmooth.solve(
             arguments.problem(problem),
             name,
-            arguments.plain(every),
+            every or None,
             arguments.real("tol", tol),
             arguments.seconds("time_limit", time_limit),
             None if max_iter is None else arguments.whole("max_iter", max_iter),
@@ -260,4 +275,9 @@ def solve(
         )
     except _nonsmooth.Error as error:
         raise arguments.meant(error, settings) from None
+    except KeyboardInterrupt as stopped:
+        native = getattr(stopped, "answer", None)
+        if native is not None:
+            setattr(stopped, "answer", Answer(native))
+        raise
     return Answer(native)

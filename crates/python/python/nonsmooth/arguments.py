@@ -5,8 +5,6 @@ from __future__ import annotations
 import operator
 from typing import Mapping, Optional, SupportsFloat, SupportsIndex
 
-import numpy as np
-
 from . import _nonsmooth
 from .problems import Problem
 from .settings import Settings
@@ -81,10 +79,3 @@ def meant(error: _nonsmooth.Error, settings: Mapping[str, object]) -> _nonsmooth
                 if key in others:
                     return _nonsmooth.Error(f"{error}; solve has the argument `{name}`")
     return error
-
-
-def plain(settings: Mapping[str, object]) -> Optional[dict[str, object]]:
-    """Settings, numbers of numpy as those of Python."""
-    if not settings:
-        return None
-    return {k: v.item() if isinstance(v, np.generic) else v for k, v in settings.items()}

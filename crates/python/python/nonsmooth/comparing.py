@@ -68,8 +68,11 @@ class Runs:
         self, cost: str = "seconds", *, kind: Optional[str] = None, tol: Optional[float] = None
     ) -> Profile:
         """Performance profiles by seconds, iterations or factorisations, on the problems of a kind at a tolerance: those of most runs where nothing is said."""
-        if kind is None:
-            kind = max(self._native.kinds(), key=lambda k: k[1])[0]
+        kinds = dict(self._native.kinds())
+        if kind is None and kinds:
+            kind = max(kinds, key=lambda one: kinds[one])
+        if kind is None or kind not in kinds:
+            raise arguments.mistake("kind", f"a kind of the runs ({', '.join(kinds) or 'there are none'})", kind)
         if tol is None:
             tol = self._native.tolerance()
         if tol is None:
@@ -116,7 +119,7 @@ def _label(solver: Union[str, Settings]) -> str:
 
 def bench(
     problems: Problems,
-    solvers: Sequence[Union[str, Settings]] = ("auto",),
+    solvers: Union[str, Settings, Sequence[Union[str, Settings]]] = ("auto",),
     *,
     tol: Union[float, Sequence[float]] = 1e-8,
     time_limit: float = 60.0,
@@ -127,9 +130,11 @@ def bench(
     A solver that does not take a problem refuses it, which is no failure. All runs are in this process; for campaigns over hours, with limits of memory, there is
     ``nonsmooth bench run``, which starts a process each; their files are the same.
     """
+    if isinstance(solvers, (str, Settings)):
+        solvers = (solvers,)
     for solver in solvers:
         name, settings = arguments.named(solver)
-        _nonsmooth.check(name, arguments.plain(settings) or {})
+        _nonsmooth.check(name, dict(settings))
     tolerances = [arguments.real("tol", one) for one in np.atleast_1d(tol).tolist()]
     for one in tolerances:
         if not 0 < one <= 1:

@@ -36,6 +36,19 @@ class Problem:
     _native: _nonsmooth.Problem
     _kind: ClassVar[str] = ""
 
+    def __init__(self) -> None:
+        kinds = ", ".join(kind.__name__ for kind in Problem.__subclasses__())
+        raise TypeError(f"Problem: expected one of its kinds ({kinds}), or nonsmooth.read")
+
+    def __copy__(self) -> Problem:
+        return Problem._of(self._native.copy())
+
+    def __deepcopy__(self, memo: object) -> Problem:
+        return self.__copy__()
+
+    def __reduce__(self) -> Any:
+        raise TypeError("Problem: expected problem.save(path) and nonsmooth.read(path), found pickle")
+
     @classmethod
     def _of(cls, native: _nonsmooth.Problem) -> Problem:
         problem: Problem = object.__new__(_BY_KIND[native.kind])
@@ -51,7 +64,7 @@ class Problem:
         self._native.update(parts)
 
     def save(self, path: Path, answer: Optional[Answer] = None) -> None:
-        """Writes the problem, with the answer as its solution, in the format of the extension (.hdf5, .toml, .mtx, .nl, .dat, ...)."""
+        """Writes the problem, with the answer as its solution, in the format of the extension (.hdf5, .toml, .mtx, .nl, .csv)."""
         self._native.save(path, None if answer is None else answer._native)
 
     def judge(self, point: object, tol: float = 1e-8) -> dict[str, Any]:

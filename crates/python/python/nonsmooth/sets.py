@@ -30,12 +30,13 @@ class Polyhedron:
     d: Optional[npt.ArrayLike] = None
 
     def _parts(self) -> dict[str, Any]:
-        C = np.zeros((0, self.A.shape[1] if hasattr(self.A, "shape") else len(self.A[0])))
+        A = self.A if hasattr(self.A, "shape") else np.asarray(self.A, dtype=float)
+        C = np.zeros((0, A.shape[-1])) if self.C is None else self.C
         return {
             "kind": "polyhedron",
-            "A": self.A,
+            "A": A,
             "b": self.b,
-            "C": C if self.C is None else self.C,
+            "C": C,
             "d": np.zeros(0) if self.d is None else self.d,
         }
 

@@ -11,6 +11,8 @@ import keyword
 import textwrap
 from typing import Any, ClassVar, Mapping, Union
 
+import numpy as np
+
 from . import _nonsmooth
 
 
@@ -20,9 +22,12 @@ def argument(key: str) -> str:
 
 
 def registered(settings: Mapping[str, object]) -> dict[str, object]:
-    """Settings by the registry's keys."""
+    """Settings by the registry's keys, numbers of numpy as those of Python."""
     keys = {argument(key): key for key in keyword.kwlist}
-    return {keys.get(name, name): value for name, value in settings.items()}
+    return {
+        keys.get(name, name): value.item() if isinstance(value, np.generic) else value
+        for name, value in settings.items()
+    }
 
 
 class Settings:
@@ -52,7 +57,7 @@ class Settings:
     def __setattr__(self, name: str, value: object) -> None:
         key = next(iter(registered({name: None})))
         if key in type(self).known:
-            changed = {**self.settings, key: value}
+            changed = {**self.settings, **registered({key: value})}
             _nonsmooth.check(self.name, changed)
             self.settings = changed
         elif name in ("name", "settings"):
@@ -78,6 +83,10 @@ class Prefixed(Settings):
     """A solver behind a reformulation, with the settings of both."""
 
     def __init__(self, solver: Union[str, Settings] = "auto", **settings: object) -> None:
+        if not isinstance(solver, (str, Settings)):
+            raise _nonsmooth.Error(
+                f"solver: expected a name or an object of settings (nonsmooth.Nsgs()), found {solver!r}"
+            )
         inner = solver if isinstance(solver, str) else solver.name
         own = {} if isinstance(solver, str) else solver.settings
         self.name = f"{self.solver}/{inner}"

@@ -272,6 +272,8 @@ def draw(scene: Union[World, Run], frame: int = -1) -> Picture:
     """A picture on paper of a world as it begins, or of a frame of a run."""
     if isinstance(scene, Run):
         return scene.draw(frame)
+    if not isinstance(scene, World):
+        raise arguments.mistake("scene", "a nonsmooth.World or a run", scene)
     return Picture(_nonsmooth.draw(scene.json()))
 
 
@@ -301,6 +303,8 @@ class Simulation:
         settle: bool = False,
         **integrator: object,
     ) -> None:
+        if not isinstance(world, World):
+            raise arguments.mistake("world", "a nonsmooth.World (nonsmooth.load reads one)", world)
         world = world.copy()
         document = world.document
         if h is not None:
@@ -310,7 +314,7 @@ class Simulation:
         table = document.setdefault("solver", {})
         if solver is not None:
             name, settings = arguments.named(solver)
-            table["name"], table["settings"] = name, arguments.plain(settings) or {}
+            table["name"], table["settings"] = name, dict(settings)
         if tol is not None:
             table["tol"] = arguments.real("tol", tol)
         self.h = float(document["time"]["h"])

@@ -202,6 +202,9 @@ impl Tools {
             solved.status = StepStatus::NotFinite;
         }
         report.energy = self.energy(stride, state);
+        if !report.energy.is_finite() {
+            solved.status = StepStatus::NotFinite;
+        }
         self.count(&mut report);
         timings.solve = solved.seconds;
         timings.total = begun.elapsed().as_secs_f64();

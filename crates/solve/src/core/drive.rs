@@ -102,7 +102,8 @@ impl Limits {
         Self { time_limit: self.time_limit.map(|t| (t - spent).max(0.0)), ..self.clone() }
     }
 
-    pub(crate) fn validate(&self) -> Result<(), SolveError> {
+    /// Errors: a tolerance that is not in (0, 1], a limit of time that is negative or no number, more threads than [`THREADS_MOST`].
+    pub fn validate(&self) -> Result<(), SolveError> {
         // The residual of doing nothing is about 1: beyond, everything would pass.
         if !(self.tolerance > 0.0 && self.tolerance <= 1.0) {
             return Err(SolveError::Limits {

@@ -9,7 +9,7 @@ fn scene(text: &str) -> SceneFile {
     SceneFile::parse(&format!("{head}{text}"), &[]).unwrap()
 }
 
-/// The bar of dynamics.md 3.11: contact time and velocity of the centre after the rebound.
+/// A bar that hits a plane with one of its ends: contact time and velocity of the centre after the rebound.
 fn rebound(elements: usize) -> (f64, f64, f64) {
     const SPEED: f64 = -0.1;
     const DENSITY: f64 = 7800.0;

@@ -10,8 +10,8 @@
 //!    ([`EarlyAcceleration`]), else ten at a time after thirty ([`Acceleration`]).
 //! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart: after five of them where they
 //!    still move much, else after the others. One factorisation and a few solves end structures at rest, whatever their height; two solves tell where nothing comes of it. Where contacts
-//!    open because weights have yet to come down to them, as in walls with head joints, it comes when the sweeps have cost a factorisation where they open fast.
-//! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, for as long as each halves the error; there sweeps come to
+//!    open because weights have yet to come down to them, as in walls with head joints, it comes at once where they open slowly, when the sweeps have cost a factorisation where they open fast.
+//! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, until three in a row have not halved the error; there sweeps come to
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter, from well inside the cones about the impulses so far: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again. Where it failed and little slides, on the convex relaxation (s = 0, `relaxed.rs`), whose path does not: where nothing slides its solution
@@ -19,7 +19,7 @@
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems. Steps are whole where W has no spread (walls, columns, arches), else shortened by a line search.
 //! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
-//!    where they are. After a trial in vain from near a solution they come first.
+//!    where they are. After a trial in vain from near a solution they come first where stage 1 was long.
 //! 7. **The central path by its arc length** ([`Pursuit`]), where Newton's iterations promise to be many: it turns back with the
 //!    path where stage 4 is stuck. Up to three times, each time smoothed by less and for longer. Walls that are shaken end here.
 //! 8. **Alternating directions** (`parts/alternating.rs`) after many proximal steps, for as long as they promise more.
@@ -77,7 +77,7 @@ use cadoux::Cadoux;
 use controller::{Controller, Origin, Verdict};
 use held::Held;
 use in_turn::{Came, InTurn};
-use starts::Halvings;
+use starts::{Halvings, PassedBy};
 
 /// The hyperparameters of `auto`; none needs to be set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -205,7 +205,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     /// Motion and impulses have been sought in turn, or cannot be.
     turned: bool,
     /// The interior point was left out: after so many Newton iterations, at this error.
-    passed_by: Option<(usize, f64)>,
+    passed_by: Option<PassedBy>,
     /// Alternating directions last began at the point, not at no impulses.
     from_here: bool,
     done: Done,
@@ -670,7 +670,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         point: &mut P::Point,
         work: &mut HybridWork<P, D>,
     ) -> Step {
-        let HybridWork { newton, state, controller, inner_best, best, done, .. } = work;
+        let HybridWork { newton, state, controller, inner_best, best, done, passed_by, .. } = work;
         let Some(newton) = newton else {
             return starts::lost();
         };
@@ -680,8 +680,11 @@ impl<const D: usize> OnContacts<Auto, D> {
         if controller.observe(&iterate) {
             inner_best.copy_from_slice(r);
         }
-        let Some(verdict) = controller.verdict(&iterate) else {
-            return Step::Continue { estimate: newton.error(r) };
+        let estimate = newton.error(r);
+        let astray = passed_by.as_mut().is_some_and(|by| by.goes_astray(estimate, controller));
+        let verdict = if astray { Some(Verdict::Failed) } else { controller.verdict(&iterate) };
+        let Some(verdict) = verdict else {
+            return Step::Continue { estimate };
         };
         done.subproblems += 1;
         match verdict {

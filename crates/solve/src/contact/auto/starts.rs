@@ -49,6 +49,8 @@ pub(super) const INTERIOR_MARGIN: f64 = 0.7;
 /// Where Newton's iterations promise to take longer than this, the interior point is worth a trial; not before so many, which is what one subproblem in vain takes.
 const INTERIOR_COST: f64 = 20.0;
 const IN_VAIN: usize = 12;
+/// Nor is it passed by any longer where so many iterations in a row have raised the error by more than this factor.
+const ASTRAY: (f64, usize) = (30.0, 3);
 const INTERIOR_ERROR: f64 = 1e-8;
 pub(super) const INTERIOR_IDLE: usize = 10;
 const INTERIOR_FIRST: usize = 30;
@@ -305,7 +307,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
     ) {
         work.controller.resume();
-        work.passed_by = Some((work.done.newton, work.controller.error()));
+        work.passed_by = Some(PassedBy::from(&work.done, &work.controller));
         if work.done.sweeps < SWEPT_LONG {
             return self.subproblem_here(problem, point, work);
         }
@@ -315,16 +317,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         work.begin_between(point, work.done.sweeps.min(most as usize).max(1));
     }
 
-    /// Whether stage 4 was passed by in vain: Newton's iterations since have been too slow for what is left from this error.
+    /// Whether stage 4 was passed by in vain: Newton's iterations since have led far off, or have been too slow for what is left from this error.
     pub(super) fn passed_by_in_vain<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         work: &HybridWork<P, D>,
         error: f64,
     ) -> bool {
-        work.passed_by.is_some_and(|(before, from)| {
-            let iterations = work.done.newton - before;
-            iterations >= IN_VAIN
-                && takes_longer([from, error], iterations, work.tolerance, INTERIOR_COST)
+        work.passed_by.is_some_and(|PassedBy { after, from, astray }| {
+            let iterations = work.done.newton - after;
+            astray >= ASTRAY.1
+                || iterations >= IN_VAIN
+                    && takes_longer([from, error], iterations, work.tolerance, INTERIOR_COST)
         })
     }
 
@@ -559,6 +562,29 @@ fn takes_longer([from, to]: [f64; 2], iterations: usize, tolerance: f64, most: f
 pub(super) fn take((theirs, error): (&[f64], f64), controller: &mut Controller, ours: &mut [f64]) {
     if controller.offer(error) {
         ours.copy_from_slice(theirs);
+    }
+}
+
+/// Where stage 4 was passed by.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PassedBy {
+    /// Newton's iterations and the error until then.
+    after: usize,
+    from: f64,
+    /// Iterations in a row far above the best error.
+    astray: usize,
+}
+
+impl PassedBy {
+    fn from(done: &Done, controller: &Controller) -> Self {
+        Self { after: done.newton, from: controller.error(), astray: 0 }
+    }
+
+    /// Whether Newton's iterations, the last one with this error, lead away for too long.
+    pub(super) fn goes_astray(&mut self, error: f64, controller: &Controller) -> bool {
+        let far = error > ASTRAY.0 * controller.error() || error.is_nan();
+        self.astray = if far { self.astray + 1 } else { 0 };
+        self.astray >= ASTRAY.1
     }
 }
 

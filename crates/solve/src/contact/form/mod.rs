@@ -11,8 +11,9 @@
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 //! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
 //! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
+//! | [`Holding`] | the problem without rows whose impulses are held | local, global |
 //!
-//! [`Regularised`] offers what the problem inside it does.
+//! [`Regularised`] offers what the problem inside it does, but for [`Explicit`] and [`Holding`].
 
 mod explicit;
 mod global;

@@ -1,7 +1,7 @@
 //! Rolling friction in units of velocity: a length for each contact turns its angular velocities and moments into velocities and impulses.
 //!
 //! With the arm ℓ_c and `D_c = diag(1, 1, 1, ℓ_c, ℓ_c)` the problem in `u' = D u`, `r = D r'` has `W' = D W D`, `q' = D q`, `mu_r' = mu_r/ℓ_c`, and
-//! is of the same form. The arm is `√(tr W_TT/tr W_RR)`, that of a ball √0.4 of its radius, rounded to a power of two: then nothing else is rounded, and the
+//! is of the same form. The arm is `√(tr W_TT/tr W_RR)`, that of a ball on a plane √1.4 of its radius, rounded to a power of two: then nothing else is rounded, and the
 //! two problems are the same problem in other units. Residuals are those of the problem in u'.
 
 use super::contact::{Law, length};
