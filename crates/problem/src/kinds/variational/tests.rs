@@ -143,6 +143,31 @@ fn verdicts_keep_with_the_units() {
     }
 }
 
+/// However far off a start is, no error is small beside it.
+#[test]
+fn a_start_far_off_makes_no_error_small() {
+    let field = || Expressions::parse(&["x1 + x2 - 3".into(), "x2 - x1 - 4".into()], &[]).unwrap();
+    // −F(x) = λ x with ‖x‖ = 1: 25 = (1 + λ)² + 1.
+    let s = 24f64.sqrt();
+    let on_the_ball = [(3.0 * s - 4.0) / 25.0, (4.0 * s + 3.0) / 25.0];
+    let inside = [-0.5, 3.5];
+    let rows = Csc::from_triplets(1, 2, [(0, 0, 1.0)].into_iter()).unwrap();
+    let free = || Set::Box { lower: vec![f64::NEG_INFINITY; 2], upper: vec![f64::INFINITY; 2] };
+    let ball = || Set::Ball { centre: vec![0.0; 2], radius: 1.0 };
+    let half = || Set::inequalities(rows.clone(), vec![10.0]);
+    for start in [0.0, 1.0, 1e3, 1e6, 1e9, 1e30] {
+        for (set, solution) in [(ball(), on_the_ball), (free(), inside), (half(), inside)] {
+            let problem = Vi::new(field(), set, vec![start; 2]).unwrap();
+            let solved =
+                |x: [f64; 2]| problem.judge(&LcpPoint { z: x.to_vec() }, 1e-8).unwrap().solved;
+            assert!(solved(solution), "from {start}");
+            for x in [[0.0; 2], [0.707_106_781_186_547_5; 2], [0.428, 0.9038], [-0.5, 3.499]] {
+                assert!(!solved(x), "from {start} at {x:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn mistakes_are_named() {
     let field = || Expressions::parse(&["x1".into(), "x2".into()], &[]).unwrap();

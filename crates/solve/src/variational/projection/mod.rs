@@ -185,7 +185,8 @@ solver!(FixedPoint);
 solver!(Extragradient);
 solver!(Hyperplane);
 
-pub(super) const NO_PROJECTION: &str = "there is no projection on the set: a polyhedron is empty";
+pub(super) const NO_PROJECTION: &str =
+    "no projection on the set is found: a polyhedron is empty, or empty but for rounding";
 
 /// Distances to which a start is moved, in units of its size.
 const INSIDE: [f64; 8] = [1e-6, 1e-4, 1e-2, 0.1, 0.5, 1.0, 10.0, 100.0];

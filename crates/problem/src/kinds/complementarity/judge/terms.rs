@@ -14,6 +14,12 @@ const VANISHING: f64 = 1e-4;
 const NEAR: [f64; 2] = [1.0 / (1_u64 << 30) as f64, 1.0 / (1_u64 << 40) as f64];
 /// How far from zero, in parts of the start: for rows that are large near a pole, where a start may lie.
 const FAR: [f64; 2] = [(1_u64 << 40) as f64, (1_u64 << 50) as f64];
+/// Where a row that vanishes with all its terms counts as large as it was elsewhere, it is asked on the way to zero and away from it, in steps of a factor 4, where it no longer becomes smaller: sizes
+/// that fall by less than this from one point to the next. So near to zero, in powers of two, and so far.
+const LEVEL: f64 = 0.9;
+const STEPS: [i32; 2] = [60, -50];
+/// Then in longer steps, down to the smallest numbers.
+const LONGER_STEPS: [i32; 8] = [64, 72, 88, 120, 184, 312, 568, 1020];
 /// Changes of the variables, in parts of their size, along which a Jacobian is held against F. So far at least is a point from a solution that its own distance from a pole makes seem near:
 /// of `3 − 1/(x − 1)` close to 1, a change of x by as little as that distance changes F by all that it is.
 const STEP: f64 = 1.0 / 1024.0;
@@ -139,11 +145,15 @@ pub(crate) struct Units {
     start: Vec<f64>,
     /// The smaller of the same at the point nearest to zero that is allowed, and far beyond the start; zero where they are not known.
     elsewhere: Vec<f64>,
+    /// The sizes on the way between these points at which rows lie level, far below both; zero where there are none, or none were asked for.
+    level: Vec<f64>,
     /// The largest sizes at the start, and elsewhere.
     largest: (f64, f64),
     /// Sizes at the start, and the points near zero and far from it until they are asked: sizes that become smaller from one to the next vanish there.
     own: Vec<f64>,
     unasked: Vec<Vec<Vec<f64>>>,
+    /// The start and the point nearest to zero, until the way between them is asked.
+    way: Option<[Vec<f64>; 2]>,
     expressions: bool,
 }
 
@@ -156,9 +166,11 @@ impl Units {
         let mut units = Self {
             start: zeros(),
             elsewhere: zeros(),
+            level: zeros(),
             largest: (0.0, 0.0),
             own: vec![],
             unasked: vec![],
+            way: None,
             expressions: field.expressions().is_some(),
         };
         terms.look(field.pattern(), start, !units.expressions);
@@ -174,6 +186,7 @@ impl Units {
         if units.expressions {
             units.ask(field, terms);
         }
+        units.way = Some([start.to_vec(), zero]);
         units
     }
 
@@ -185,14 +198,78 @@ impl Units {
         x: &[f64],
         precisely: bool,
     ) -> bool {
-        let defined = terms.look(field.pattern(), x, precisely);
+        let mut defined = terms.look(field.pattern(), x, precisely);
         let mut rows = terms.sizes.iter().zip(&self.start);
-        let matters = !self.unasked.is_empty() && rows.any(|(d, unit)| *d < VANISHING * unit);
-        if !(defined && matters) {
-            return defined;
+        if defined && !self.unasked.is_empty() && rows.any(|(d, unit)| *d < VANISHING * unit) {
+            self.ask(field, terms);
+            defined = terms.look(field.pattern(), x, precisely);
         }
-        self.ask(field, terms);
-        terms.look(field.pattern(), x, precisely)
+        let mut rows = terms.sizes.iter().enumerate();
+        let vanishes = rows.any(|(i, d)| self.own[i] > 0.0 && *d < self.least(i))
+            || terms.sizes.iter().all(|d| *d < self.least_of_all());
+        if defined
+            && vanishes
+            && let Some(way) = self.way.take()
+        {
+            self.ask_on_the_way(way, field, terms);
+            defined = terms.look(field.pattern(), x, precisely);
+        }
+        defined
+    }
+
+    /// A start may lie far off, or near a pole that is at zero, and no point that was asked say how large the rows are between: where their sizes lie level on the way, or rise again, and are a small
+    /// part of those known, they are the units.
+    fn ask_on_the_way(
+        &mut self,
+        [start, zero]: [Vec<f64>; 2],
+        field: &dyn Field,
+        terms: &mut Terms,
+    ) {
+        let n = start.len();
+        let mut least = vec![f64::INFINITY; n + 1];
+        for last in STEPS {
+            let inwards = last > 0;
+            // Where nothing is between, away from zero itself.
+            let from = if zero == start { vec![0.0; n] } else { zero.clone() };
+            if inwards && zero == start || start == from {
+                continue;
+            }
+            let short = (1..=last.abs() / 2).map(|k| 2 * k * last.signum());
+            let steps = short.chain(LONGER_STEPS.into_iter().filter(|_| inwards));
+            let mut before: Vec<f64> = self.own.clone();
+            before.push(self.largest.0);
+            for k in steps {
+                let part = 2.0_f64.powi(-k);
+                let point: Vec<f64> =
+                    from.iter().zip(&start).map(|(z, s)| z + part * (s - z)).collect();
+                let finite = point.iter().all(|x| x.is_finite());
+                if budget::over()
+                    || !finite
+                    || !tentatively(|| terms.look(field.pattern(), &point, !self.expressions))
+                {
+                    break;
+                }
+                let largest = terms.sizes.iter().fold(0.0_f64, |most, d| most.max(*d));
+                let now = terms.sizes.iter().copied().chain([largest]);
+                for ((least, before), now) in least.iter_mut().zip(&mut before).zip(now) {
+                    if now >= LEVEL * *before && *before > 0.0 {
+                        *least = least.min(now.max(*before));
+                    }
+                    *before = now;
+                }
+            }
+        }
+        // These are no sizes of the point last looked at any more.
+        terms.at.clear();
+        let known = lesser(self.largest.0, self.largest.1);
+        if least[n] < VANISHING * known {
+            self.largest.1 = least[n];
+        }
+        for (i, least) in least[..n].iter().enumerate() {
+            if self.own[i] > 0.0 && *least < VANISHING * lesser(self.start[i], self.elsewhere[i]) {
+                self.level[i] = *least;
+            }
+        }
     }
 
     fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {
@@ -226,13 +303,20 @@ impl Units {
 
     /// ω of row i, whose terms have this size; whichever points were measured before, it is the same.
     pub(crate) fn at(&self, i: usize, size: f64) -> (f64, f64) {
+        let known = lesser(self.start[i], self.elsewhere[i]);
+        if self.level[i] > 0.0 && size < VANISHING * known {
+            return (self.start[i], self.level[i]);
+        }
         let matters = self.expressions || size < VANISHING * self.start[i];
         (self.start[i], if matters { self.elsewhere[i] } else { 0.0 })
     }
 
     /// The size that terms of row i count at least.
     pub(crate) fn least(&self, i: usize) -> f64 {
-        VANISHING * lesser(self.start[i], self.elsewhere[i])
+        match self.level[i] {
+            level if level > 0.0 => VANISHING * level,
+            _ => VANISHING * lesser(self.start[i], self.elsewhere[i]),
+        }
     }
 
     /// As [`least`](Self::least), of the largest row.

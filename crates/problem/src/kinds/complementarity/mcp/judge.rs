@@ -11,7 +11,8 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
 /// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|` (where F does not change as J says, `|F_i|` and its change along a vector of the size of x, if that is smaller); of rows that vanish with all their terms at least
 /// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share; or
-/// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller: a start far off, or near a pole, makes nothing small. Of a row that along a change of x by a
+/// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller; where a row is smaller than that ten-thousandth, also the size on the way to these points where it no longer falls, if that is a smaller
+/// part: a start far off, or near a pole at zero, makes nothing small. Of a row that along a change of x by a
 /// thousandth does not change as J says, that change counts in place of the terms that it should have had. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the
 /// finite bounds. Therefore neither changes when rows or variables are multiplied by numbers.

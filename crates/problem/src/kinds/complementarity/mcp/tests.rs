@@ -189,7 +189,7 @@ fn a_pole_makes_no_error_small() {
     /// F, bounds, start, points that are none, the solution.
     type Case = (&'static str, [f64; 2], f64, &'static [f64], f64);
     let inf = f64::INFINITY;
-    let all: [Case; 9] = [
+    let all: [Case; 12] = [
         ("3 - 1/(x - 1)", [1.0, inf], 1.0, &[1.0 + 5.8e-11, 1.0 + 1e-13], 4.0 / 3.0),
         ("3 - 1/(x - 1)^2", [1.0, inf], 1.0, &[1.0 + 1e-11, 3.0], 1.577_350_269_189_625_8),
         ("1/(1 - x) - 3", [-inf, 1.0], 1.0, &[1.0 - 1e-12, 0.0], 2.0 / 3.0),
@@ -199,15 +199,55 @@ fn a_pole_makes_no_error_small() {
         ("1 - 1e-20/x^2", [0.0, inf], 1.0, &[1.0, 1e-2], 1e-10),
         ("1e9 - 1/x", [0.0, inf], 1000.0, &[1000.0], 1e-9),
         ("1/x^2 - 3", [-inf, inf], 1e-12, &[0.0656, 1e-12], 3f64.sqrt().recip()),
+        ("x^4 - 10/x^4", [0.0, inf], 1e-6, &[0.979697, 1.3], 10f64.powf(0.125)),
+        ("x^3 - 10/x^3", [0.0, inf], 1e-8, &[0.5, 1.4], 10f64.powf(1.0 / 6.0)),
+        ("x^2 - 10/x^2", [1e-12, inf], 1e-12, &[0.0658, 1.7], 10f64.powf(0.25)),
     ];
     for (f, [lower, upper], start, none, solution) in all {
         let f = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
         let problem = Mcp::new(f.clone(), vec![lower], vec![upper], vec![start]).unwrap();
         let solved = |x: f64| problem.judge(&LcpPoint { z: vec![x] }, 1e-8).unwrap().solved;
+        // Nor does it matter where the judge has been before.
+        let mut gauge = problem.gauge().unwrap();
+        let mut on_the_way = |x: f64| {
+            [x, start, x].map(|x| {
+                let point = LcpPoint { z: vec![x] };
+                problem.measure(&point, &mut gauge).passes(1e-8)
+                    && problem.certify(&point, &mut gauge).passes(1e-8)
+            })[2]
+        };
+        assert!(!on_the_way(start));
         for &x in none {
-            assert!(!solved(x), "{f:?} at {x}");
+            assert!(!solved(x) && !on_the_way(x), "{f:?} at {x}");
         }
-        assert!(solved(solution), "{f:?}");
+        assert!(solved(solution) && on_the_way(solution), "{f:?}");
+    }
+}
+
+/// Wherever a start is: what is as large as all of its terms on the way from there to zero is no error.
+#[test]
+fn a_start_far_off_or_at_a_pole_makes_no_error_small() {
+    let inf = f64::INFINITY;
+    for start in [1.0, 1e4, 2e9, 1e10, 1e15, 1e50] {
+        let field = closures(|x| x * x + 1.0, |x| 2.0 * x);
+        let problem = Mcp::new(field, vec![-inf; 2], vec![inf; 2], vec![start; 2]).unwrap();
+        for x in [-0.148, 0.0, 1e-3] {
+            let point = LcpPoint { z: vec![x; 2] };
+            assert!(!problem.judge(&point, 1e-8).unwrap().solved, "from {start} at {x}");
+        }
+        let field = closures(|x| x - 1.0, |_| 1.0);
+        let problem = Mcp::new(field, vec![-inf; 2], vec![inf; 2], vec![start; 2]).unwrap();
+        let solved = |x: f64| problem.judge(&LcpPoint { z: vec![x; 2] }, 1e-8).unwrap().solved;
+        assert!(!solved(0.0) && !solved(1.0 + 1e-6) && solved(1.0), "from {start}");
+    }
+    for (f, lower, start, x) in [
+        ("-1/x^2 - 1", 1e-6, 1e-6, 1e3),
+        ("-1/x^2 - 1", 1e-6, 1e-6, 1e30),
+        ("x^2 + 1 + 1e-30/x", -inf, 1e10, -0.148),
+    ] {
+        let field = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
+        let problem = Mcp::new(field, vec![lower], vec![inf], vec![start]).unwrap();
+        assert!(!problem.judge(&LcpPoint { z: vec![x] }, 1e-8).unwrap().solved, "{f} at {x}");
     }
 }
 

@@ -8,6 +8,7 @@ use super::{Set, Vi};
 use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
+use crate::field::tentatively;
 use crate::kinds::complementarity::judge::{Terms, Units, lesser, natural};
 pub(super) use projection::Projection;
 
@@ -34,8 +35,8 @@ pub struct SetCounts {
 
 /// The judge's constants and buffers for a variational inequality.
 ///
-/// `r = x − P_X(x − γ F(x))` vanishes at solutions, for any γ > 0. It is taken with `γ = ξ/φ` and divided by ξ, where ξ is the size of x (the largest modulus in x, in the start and in
-/// [`Set::size`]; where all are zero, φ and γ = 1) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it; at least a ten-thousandth of that at the start). So it does not change
+/// `r = x − P_X(x − γ F(x))` vanishes at solutions, for any γ > 0. It is taken with `γ = ξ/φ` and divided by ξ, where ξ is the size of x (the largest modulus in x, in the projection of the start onto X and in
+/// [`Set::size`]; where all are zero, φ and γ = 1; a start that is ten thousand times as large as x, the set and the length that F has near zero, its terms there over their slopes, counts as that length only) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it; at least a ten-thousandth of that at the start). So it does not change
 /// where F, or x with the set, is multiplied by a positive number. Variables and rows of one problem share their unit: a set that mixes variables knows no other.
 ///
 /// | field of [`Measure`] | formula |
@@ -60,8 +61,11 @@ pub struct ViGauge {
     kept: Vec<f64>,
     /// For γ = 1 and for the two others: the points to be projected are far from each other, the active rows too.
     projections: [Vec<Projection>; 3],
-    /// Of the start and the set.
+    /// The start as it counts, and the size of it and the set.
+    start: Vec<f64>,
     size: f64,
+    /// Whether it was asked how far off the start is.
+    asked: bool,
     /// γ of each variable.
     gammas: Vec<f64>,
 }
@@ -85,12 +89,26 @@ const LOOKED_AT: f64 = 1e-3;
 
 /// The part of the size of the start and the set that each part of x has at least.
 const OF_OTHERS: f64 = 1e-4;
+/// A start that is so many times as large as all else is far off.
+const FAR_OFF: f64 = 1e4;
+/// How near to zero, in parts of the start, a function without expressions is asked for its length.
+const NEAR: f64 = 1.0 / (1_u64 << 60) as f64;
 
 impl ViGauge {
     pub(super) fn new(problem: &Vi) -> Self {
         let n = problem.dim();
         let zeros = || vec![0.0; n];
         let mut terms = Terms::new(&*problem.F);
+        let mut start = problem.start.clone();
+        for (first, set) in problem.set.parts() {
+            let range = first..first + set.dim();
+            let from = &problem.start[range.clone()];
+            let mut y = vec![0.0; range.len()];
+            if Projection::new(set).onto(set, from, from, &mut y) && y.iter().all(|y| y.is_finite())
+            {
+                start[range].copy_from_slice(&y);
+            }
+        }
         Self {
             units: Units::new(&*problem.F, &mut terms, &problem.start, zeros()),
             terms,
@@ -100,16 +118,43 @@ impl ViGauge {
             kept: zeros(),
             projections: [0, 1, 2]
                 .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
-            size: largest(&problem.start).max(problem.set.size()),
+            size: largest(&start).max(problem.set.size()),
+            start,
+            asked: false,
             gammas: zeros(),
         }
     }
 
     /// F at x, and φ. `None` where F is not defined.
     fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
+        if !self.asked && self.size > FAR_OFF * largest(x).max(problem.set.size()) {
+            self.asked = true;
+            self.bring_near(problem);
+        }
         let Self { terms, units, .. } = self;
         let defined = units.look(&*problem.F, terms, x, precisely);
         defined.then(|| largest(&terms.sizes).max(units.least_of_all()))
+    }
+
+    /// A start far beyond the length that F has near zero counts as that length.
+    fn bring_near(&mut self, problem: &Vi) {
+        let Self { terms, start, size, .. } = self;
+        let part = if problem.F.expressions().is_some() { 0.0 } else { NEAR };
+        let near: Vec<f64> = start.iter().map(|s| part * s).collect();
+        let pattern = problem.F.pattern();
+        if !tentatively(|| terms.look(pattern, &near, false)) || !terms.smooth {
+            return;
+        }
+        let length = terms.sizes.iter().enumerate().fold(0.0_f64, |length, (i, d)| {
+            let slope = largest(&terms.jacobian[pattern.range(i)]);
+            if slope > 0.0 { length.max(d / slope) } else { length }
+        });
+        let known = length.max(problem.set.size());
+        if length > 0.0 && *size > FAR_OFF * known {
+            let share = known / *size;
+            start.iter_mut().for_each(|s| *s *= share);
+            *size = known;
+        }
     }
 
     /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at and the γ of each variable; the projection is left in y, the difference in `moved`.
@@ -156,7 +201,7 @@ impl ViGauge {
             let whole = first..first + set.dim();
             let Set::Box { lower, upper } = set else {
                 let of = |x: &[f64]| largest(&x[whole.clone()]);
-                let known = of(&problem.start).max(set.size());
+                let known = of(&self.start).max(set.size());
                 let size = known.max(of(x)).max(least);
                 let phi = whole.clone().map(phi).fold(0.0, f64::max);
                 for i in whole {
@@ -166,7 +211,7 @@ impl ViGauge {
             };
             for i in whole {
                 let bounds = [lower[i - first], upper[i - first]].into_iter();
-                let known = bounds.filter(|b| b.is_finite()).chain([problem.start[i], x[i]]);
+                let known = bounds.filter(|b| b.is_finite()).chain([self.start[i], x[i]]);
                 let size = known.fold(least, |size: f64, x| size.max(x.abs()));
                 (sizes[i], self.gammas[i]) = scaled(size, phi(i));
             }
