@@ -223,12 +223,7 @@ pub fn field(
     if let Some(fault) = watcher.fault() {
         return Err(fault);
     }
-    // Set by what is raised until this field is made, and never after: a probe in the middle of its questions asks no more.
-    let raised = watcher.stop.clone();
-    let value = move |x: &[f64], f: &mut [f64]| match raised.load(Ordering::Relaxed) {
-        true => f.fill(f64::NAN),
-        false => call.write(x, f, values),
-    };
+    let value = move |x: &[f64], f: &mut [f64]| call.write(x, f, values);
     let pattern = match (pattern, jacobian) {
         (Some(given), _) => Some(places(&square("pattern", given, x.len())?)?),
         (None, Some(jacobian)) => {

@@ -28,6 +28,9 @@ pyo3::create_exception!(
     "A mistake of the caller, in one sentence: the place, what was expected there and what was found."
 );
 
+/// How deep sets and values of settings may be within each other: one that is a part of itself has no end.
+const DEEPEST: usize = 64;
+
 /// A mistake in the words of the library.
 fn mistake(error: impl ToString) -> PyErr {
     Error::new_err(error.to_string())

@@ -9,7 +9,7 @@ use numpy::{PyArray1, PyArrayMethods, ToPyArray};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::{expected, mistake, numbers};
+use crate::{DEEPEST, expected, mistake, numbers};
 
 /// What a user gives, by letters. `None` is as if it were not given. Each part is taken once.
 pub struct Given<'a, 'py> {
@@ -196,9 +196,6 @@ pub fn type_name(given: &Bound<'_, PyAny>) -> String {
 pub fn set(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Set> {
     set_within(place, given, DEEPEST)
 }
-
-/// Products within products: a set that is a part of itself has no end.
-const DEEPEST: usize = 64;
 
 fn set_within(place: &str, given: &Bound<'_, PyAny>, left: usize) -> PyResult<Set> {
     let refused = || {

@@ -340,9 +340,8 @@ impl Problem {
 
     /// Another problem, as this is now: to change one leaves the other as it is. A function of Python is the same.
     fn copy(&self) -> Self {
-        let file = self.file.read().unwrap_or_else(PoisonError::into_inner).clone();
         Self {
-            file: RwLock::new(file),
+            file: RwLock::new(self.file()),
             kept: Mutex::new(Kept::default()),
             faults: self.faults.clone(),
         }

@@ -9,7 +9,7 @@ use pyo3::types::{PyDict, PyList, PyTuple};
 use pythonize::{depythonize, pythonize};
 use serde_json::{Value, json};
 
-use crate::{expected, mistake};
+use crate::{DEEPEST, expected, mistake};
 
 fn offer<P: Registered + OfAny>() -> Value {
     let abouts: Vec<&About> = registry::abouts::<P>();
@@ -28,9 +28,6 @@ pub fn offers(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
     let all = each_kind!(P => offer::<P>());
     Ok(pythonize(py, &all)?)
 }
-
-/// Values within values: one that is a part of itself has no end.
-const DEEPEST: usize = 64;
 
 /// Settings from a dictionary.
 pub fn settings(given: &Bound<'_, PyAny>) -> PyResult<SettingsMap> {

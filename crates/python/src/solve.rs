@@ -85,20 +85,18 @@ fn there(
     how: Solve,
     file: Arc<ProblemFile>,
     mut kept: Kept,
-    watcher: &Arc<Watcher>,
+    watcher: &Watcher,
     callback: Option<&Py<PyAny>>,
 ) -> (Solved, Kept) {
-    let (told, mine) = (callback.is_some(), watcher.clone());
+    let told = callback.is_some();
     let hear = |news: Option<nonsmooth_solve::Progress>| {
         ask(watcher, |py| called(py, callback, news.as_ref()));
     };
     elsewhere(hear, move |say| {
-        let solved = mine.at_work(|| {
-            how.again(&file.problem, &mut kept, &mut |progress| {
-                if told {
-                    say(*progress);
-                }
-            })
+        let solved = how.again(&file.problem, &mut kept, &mut |progress| {
+            if told {
+                say(*progress);
+            }
         });
         (solved, kept)
     })

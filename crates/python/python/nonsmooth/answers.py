@@ -172,7 +172,7 @@ class Answer:
     def contacts(self) -> Table:
         """A row for each contact: status, impulse r (N·s) and velocity u (m/s) by components, mu."""
         if "friction" not in self._native.kind:
-            raise AttributeError(f"contacts: expected a problem of contacts, found {self._native.kind}")
+            raise AttributeError("contacts")
         return self.table
 
     @cached_property

@@ -103,6 +103,9 @@ impl ViGauge {
         for (first, set) in problem.set.parts() {
             let range = first..first + set.dim();
             let from = &problem.start[range.clone()];
+            if violation(set, from) == 0.0 {
+                continue;
+            }
             let mut y = vec![0.0; range.len()];
             if Projection::new(set).onto(set, from, from, &mut y) && y.iter().all(|y| y.is_finite())
             {
