@@ -276,8 +276,8 @@ def solve(
     except _nonsmooth.Error as error:
         raise arguments.meant(error, settings) from None
     except KeyboardInterrupt as stopped:
-        native = getattr(stopped, "answer", None)
-        if native is not None:
-            setattr(stopped, "answer", Answer(native))
+        best = getattr(stopped, "answer", None)
+        if best is not None:
+            setattr(stopped, "answer", Answer(best))
         raise
     return Answer(native)
