@@ -176,7 +176,7 @@ impl MuRange {
 
     fn of(mu: &[f64]) -> Self {
         Self {
-            min: mu.iter().copied().fold(f64::INFINITY, f64::min),
+            min: mu.iter().copied().reduce(f64::min).unwrap_or(0.0),
             max: mu.iter().copied().fold(0.0, f64::max),
             frictionless: mu.iter().filter(|&&m| m == 0.0).count(),
         }

@@ -52,6 +52,9 @@ impl Pattern {
         let mut groups = Groups::new(contacts);
         let mut pattern =
             Self { rows: contacts, blocks: 0, row_min: usize::MAX, row_max: 0, groups: 0 };
+        if contacts == 0 {
+            return Self { row_min: 0, ..pattern };
+        }
         let mut felt = vec![];
         let mut seen_by = vec![usize::MAX; contacts];
         for c in 0..contacts {
@@ -75,6 +78,6 @@ impl Pattern {
 
     /// The mean number of blocks of a row.
     pub fn row_mean(&self) -> f64 {
-        self.blocks as f64 / self.rows as f64
+        self.blocks as f64 / self.rows.max(1) as f64
     }
 }

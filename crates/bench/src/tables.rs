@@ -305,7 +305,7 @@ pub fn summary_page(rows: &[Row]) -> Table {
         "solved %",
         "fastest %",
         "median ratio",
-        "mean ratio",
+        "geometric mean",
         "seconds",
     ];
     head.extend(fixed.map(String::from));

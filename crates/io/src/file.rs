@@ -68,8 +68,7 @@ impl ProblemFile {
     ///
     /// Errors: a content of no known format; anything that is missing, of a wrong type or shape, not finite or out of range, by its place in the file.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
-        let path = path.as_ref();
-        format::format(path)?.read(path)
+        format::read_file(path.as_ref())
     }
 
     /// Reads what the bytes of a file are, whose format its beginning says; `name` stands for it in messages.

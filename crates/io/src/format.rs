@@ -128,6 +128,16 @@ pub fn format(path: &Path) -> Result<&'static dyn Format, IoError> {
     sniffed(path, &glance(path)?)
 }
 
+/// What a file of any format holds. A pipe is read once: what a glance took in would be gone.
+pub(crate) fn read_file(path: &Path) -> Result<ProblemFile, IoError> {
+    let told = of_extension(path).is_some_and(|f| f.about().owns_extensions);
+    if told || std::fs::metadata(path).is_ok_and(|m| m.is_file()) {
+        return format(path)?.read(path);
+    }
+    let bytes = bytes(path)?;
+    sniffed(path, &bytes)?.parse(path, &bytes)
+}
+
 /// The format of a file by its first bytes; `path` is its name in messages.
 ///
 /// Errors: a content of no known format.

@@ -55,13 +55,14 @@ pub trait Problem {
     fn certify(&self, point: &Self::Point, gauge: &mut Self::Gauge) -> Measure;
 
     /// The residuals of `point`, none below what [`certify`](Self::certify) finds but for what decides nothing, where plain arithmetic with a bound of its rounding is enough to see that it
-    /// passes at `tolerance`: much cheaper, and for most points of well scaled problems enough. `None` says nothing of the point. Allocates nothing.
+    /// passes at `tolerance`: much cheaper, and for most points of well scaled problems enough. Second, their merit without what the bound adds: to steer by. `None` says nothing of the point.
+    /// Allocates nothing.
     fn accept(
         &self,
         _point: &Self::Point,
         _gauge: &mut Self::Gauge,
         _tolerance: f64,
-    ) -> Option<Measure> {
+    ) -> Option<(Measure, f64)> {
         None
     }
 

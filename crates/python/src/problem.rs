@@ -241,16 +241,22 @@ impl Problem {
         &self,
         py: Python<'_>,
         path: PathBuf,
-        answer: Option<&Bound<'_, crate::solve::Answer>>,
+        answer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
+        use nonsmooth_problem::check::Judged;
         let mut file = (*self.file()).clone();
-        if let Some(answer) = answer {
-            let answer = &answer.get().answer;
-            file.problem.validate_point(&answer.point).map_err(mistake)?;
-            let partner = answer.verdict.velocity.clone();
-            let stored = StoredPoint::new(&file.problem, answer.point.clone(), partner);
-            file.solution =
-                Some(StoredPoint { statuses: answer.verdict.statuses.clone(), ..stored });
+        if let Some(given) = answer {
+            let point = self::point(&file.problem, "answer", given)?;
+            file.problem.validate_point(&point).map_err(mistake)?;
+            let verdict = match given.cast::<crate::solve::Answer>() {
+                Ok(answer) => answer.get().answer.verdict.clone(),
+                Err(_) => {
+                    let tolerance = Limits::default().tolerance;
+                    py.detach(|| file.problem.judge(&point, tolerance)).map_err(mistake)?
+                }
+            };
+            let stored = StoredPoint::new(&file.problem, point, verdict.velocity);
+            file.solution = Some(StoredPoint { statuses: verdict.statuses, ..stored });
         }
         py.detach(|| file.write(path)).map_err(mistake)
     }

@@ -396,6 +396,18 @@ impl Run {
         self.report.stopped
     }
 
+    /// Steps in which bodies overlapped so deeply that shapes may have passed through each other.
+    #[getter]
+    fn deep(&self) -> u64 {
+        self.report.deep
+    }
+
+    /// When the first of them ended.
+    #[getter]
+    fn first_deep(&self) -> Option<f64> {
+        self.report.first_deep
+    }
+
     /// The names of the bodies.
     #[getter]
     fn bodies(&self) -> Vec<String> {

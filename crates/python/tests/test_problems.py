@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import multiprocessing
 import pickle
 
 import numpy as np
@@ -288,8 +289,57 @@ def test_copies_are_problems_of_their_own():
         np.testing.assert_array_equal(copied.mu, [0.0, 0.0])
         np.testing.assert_array_equal(problem.mu, [0.4, 0.4])
         assert type(copied) is ns.Friction and ns.solve(copied).solved
-    with pytest.raises(TypeError, match="save"):
-        pickle.dumps(problem)
+
+
+def test_problems_are_pickled_as_they_are():
+    h, mu = np.vstack([np.eye(3), -np.eye(3)]).reshape(6, 3), 0.4
+    contacts = ns.Friction(M=np.eye(6), H=h, f=np.arange(6.0), w=[-0.1, 0.2, 1 / 3], mu=mu)
+    for problem in (
+        ns.Friction(W=W, q=Q, mu=mu),
+        contacts,
+        ns.LCP(spd(3), -np.ones(3)),
+        ns.MCP(["x1^3 - 1/3"], [0.5], lower=[-1.0], upper=[np.inf]),
+        ns.VI(["x1 - 2", "x2"], ns.Ball([0.0, 0.1], 1.0), [0.0, 0.5]),
+    ):
+        again = pickle.loads(pickle.dumps(problem))
+        assert type(again) is type(problem) and again.parts.keys() == problem.parts.keys()
+        first, second = ns.solve(problem), ns.solve(again)
+        for name, part in first.parts.items():
+            np.testing.assert_array_equal(second.parts[name], part)
+    with pytest.raises(TypeError, match="MCP cannot be pickled: .*values only"):
+        pickle.dumps(ns.MCP(lambda x: x - 1, [0.0]))
+
+
+def test_answers_are_pickled_without_their_problems(tmp_path):
+    problem = ns.Friction(W=W, q=Q, mu=0.4)
+    answer = ns.solve(problem, tol=1e-10)
+    again = pickle.loads(pickle.dumps(answer))
+    assert again.status is ns.Status.SOLVED and again.solved and repr(again) == repr(answer)
+    for name in ("residual", "message", "account", "residuals", "counts", "worst", "certificate"):
+        assert getattr(again, name) == getattr(answer, name)
+    for name, part in answer.parts.items():
+        np.testing.assert_array_equal(getattr(again, name), part)
+    with pytest.raises(ValueError, match="read-only"):
+        again.r[0] = 1.0
+    assert again.contacts.dtype == answer.contacts.dtype and len(again.history) == len(answer.history)
+    # It is a point as any other.
+    assert problem.judge(again)["solved"] and ns.solve(problem, warm_start=again).iterations == 0
+    problem.save(tmp_path / "solved.hdf5", again)
+    np.testing.assert_array_equal(ns.read(tmp_path / "solved.hdf5").solution["r"], answer.r)
+    with pytest.raises(ns.Error, match="warm_start"):
+        ns.derivative(problem, again)
+    for copied in (copy.copy(answer), copy.deepcopy(answer), pickle.loads(pickle.dumps(again))):
+        np.testing.assert_array_equal(copied.r, answer.r)
+    with pytest.raises(ns.Unsolved):
+        pickle.loads(pickle.dumps(ns.solve(problem, max_iter=0, tol=1e-10))).raise_if_unsolved()
+
+
+def test_other_processes_solve():
+    problems = [ns.Friction(W=W, q=Q, mu=mu) for mu in (0.1, 0.4)]
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        answers = pool.map(ns.solve, problems)
+    for problem, answer in zip(problems, answers):
+        np.testing.assert_array_equal(answer.r, ns.solve(problem).r)
 
 
 def test_settings_take_numbers_of_numpy():

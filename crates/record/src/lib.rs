@@ -65,8 +65,15 @@ pub fn frame(simulation: &Simulation) -> Frame {
 
 /// What elastic solids are called in a file, where those without a name have a number.
 fn elastic_names(world: &World) -> Vec<String> {
+    let taken = |name: &str| world.elastic.iter().any(|e| e.name == name);
     let own = |(k, e): (usize, &Elastic)| match e.name.as_str() {
-        "" => format!("elastic {k}"),
+        "" => {
+            let mut name = format!("elastic {k}");
+            while taken(&name) {
+                name.push('\'');
+            }
+            name
+        }
         name => name.into(),
     };
     world.elastic.iter().enumerate().map(own).collect()

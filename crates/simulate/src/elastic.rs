@@ -59,8 +59,8 @@ impl Elastic {
 
     pub(crate) fn validate(&self, key: &str, world: &World) -> Result<(), SimulateError> {
         self.solid.validate(key)?;
-        if self.name.contains('/') {
-            let expected = "a name without `/`, which files cannot hold";
+        if self.name.contains('/') || self.name == "." {
+            let expected = "a name without `/`, other than `.`, which files cannot hold";
             return Err(SimulateError::value(format!("{key}.name"), expected, &self.name));
         }
         let count = world.materials().len();

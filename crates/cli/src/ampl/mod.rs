@@ -209,6 +209,10 @@ fn answer(
             Solution { echo: &said.echo, message: &message, x: &said.x, result: said.result };
         solution.write(&path).map_err(|e: IoError| e.to_string())?;
     }
+    // Pyomo shows a user nothing of a message that refuses.
+    if call.ampl && said.result >= result::ERROR {
+        output::print(&format!("{message}\n"));
+    }
     if !call.ampl && options.wantsol & 8 == 0 {
         output::print(&format!("{message}\n"));
     }

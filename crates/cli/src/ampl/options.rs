@@ -25,7 +25,7 @@ pub(super) struct Options {
 const OTHERS: &str = "any other";
 
 /// The keys with what they mean, as `-=` lists them.
-pub(super) const KEYS: [(&str, &str); 11] = [
+pub(super) const KEYS: [(&str, &str); 12] = [
     ("convergence_tolerance", "the same as tol"),
     ("infinity", "bounds of this modulus and more are infinite (1e20)"),
     ("major_iteration_limit", "the same as max_iter"),
@@ -35,6 +35,7 @@ pub(super) const KEYS: [(&str, &str); 11] = [
         "1: inequalities without a variable become rows of their own; 0 (default): they are refused",
     ),
     ("solver", "the solver, one of `nonsmooth list` (auto)"),
+    ("subsolver", "the same as solver, which Pyomo keeps to itself"),
     ("time_limit", "at most this many seconds"),
     ("tol", "the relative residual to reach (1e-8)"),
     ("version", "print the version (no value)"),

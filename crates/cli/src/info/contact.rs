@@ -126,7 +126,9 @@ impl Facts {
         };
         row(text, "density", dofs);
         let MuRange { min, max, frictionless } = traits.mu;
-        let mu = if min == max {
+        let mu = if traits.contacts == 0 {
+            "no contacts".into()
+        } else if min == max {
             format!("mu = {min}")
         } else {
             format!("mu from {min} to {max}, {} without friction", count(frictionless, "contact"))

@@ -158,6 +158,9 @@ fn how_it_ended_has_a_number() {
     for mistake in ["magic=1", "solver=magic", "tol=0", "tol=often", "tol"] {
         let (x, end) = place.solved(&[mistake]);
         assert_eq!((x.len(), &end[..]), (0, "objno 0 501"), "{mistake}");
+        // Pyomo shows a user nothing of the file.
+        let run = place.run(&["m", "-AMPL", mistake]).exits(0);
+        assert!(run.stdout.contains(&place.solution()[0]), "{}", run.stdout);
     }
     let refused = |from: &str, to: &str| Place::new(&MODEL.replacen(from, to, 1)).solved(&[]).1;
     assert_eq!(refused("2 0\nk1", "0 3 2\nk1"), "objno 0 200");

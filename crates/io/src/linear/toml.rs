@@ -16,7 +16,7 @@ use serde::Deserialize;
 use serde::de::{self, DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 
 use super::{Digits, check, set};
-use crate::format::About;
+use crate::format::{About, bytes, put};
 use crate::tokens::text;
 use crate::{Format, Info, IoError, ProblemFile, StoredPoint};
 
@@ -236,6 +236,38 @@ impl Format for Toml {
         let problem = check(name, file)?;
         Ok(format(name, file, problem)?.into_bytes())
     }
+
+    /// In the text that is there, remarks and all, only `[solution]` becomes another one.
+    fn write_solution(&self, path: &Path, file: &ProblemFile) -> Result<(), IoError> {
+        let problem = check(path, file)?;
+        let anew = format(path, file, problem)?;
+        let there = bytes(path).ok().and_then(|old| String::from_utf8(old).ok());
+        let kept = there.and_then(|old| {
+            let text = without_solution(&old)? + &solution(problem, file);
+            // What is not as it was is written anew.
+            let again = parse(path, &text).ok()?;
+            let point = |file: &ProblemFile| file.solution.as_ref().map(|s| s.point.clone());
+            (again.problem == file.problem && point(&again) == point(file)).then_some(text)
+        });
+        put(path, kept.unwrap_or(anew).as_bytes())
+    }
+}
+
+/// The text without the lines of its solution. `None` of what is no TOML.
+fn without_solution(text: &str) -> Option<String> {
+    let table = toml::de::DeTable::parse(text).ok()?;
+    let found = table.get_ref().iter().find(|(key, _)| key.get_ref() == "solution");
+    let mut kept = text.to_owned();
+    if let Some((key, value)) = found {
+        let first = text[..key.span().start].rfind('\n').map_or(0, |at| at + 1);
+        let ends = value.get_ref().as_table().into_iter().flatten().map(|(_, x)| x.span().end);
+        let last = ends.fold(key.span().end, usize::max);
+        let end = text[last..].find('\n').map_or(text.len(), |at| last + at + 1);
+        kept.replace_range(first..end, "");
+    }
+    kept.truncate(kept.trim_end().len());
+    kept.push('\n');
+    Some(kept)
 }
 
 /// Whether a line begins with `key =`.
@@ -486,13 +518,19 @@ fn format(path: &Path, file: &ProblemFile, problem: &Complementarity) -> Result<
         }
     }
     sets.iter().for_each(|(key, set)| set::write(&mut out, key, set, &file.info.names));
+    Ok(out + &solution(problem, file))
+}
+
+/// The text of the solution, if there is one.
+fn solution(problem: &Complementarity, file: &ProblemFile) -> String {
+    let mut out = String::new();
     if let Some(stored) = &file.solution {
         line(&mut out, "\n[solution]");
         let partner = stored.partner.as_deref();
         let parts = with_complementarity!(problem, p => p.parts_of(&stored.point, partner));
         parts.into_iter().for_each(|(key, x)| vector(&mut out, key, x));
     }
-    Ok(out)
+    out
 }
 
 /// A function of the problem that is no expressions.

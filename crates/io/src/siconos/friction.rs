@@ -30,6 +30,11 @@ pub(super) fn friction(t: &mut Tokens, path: &Path) -> Result<Friction, IoError>
         Err(e) => (e, reduced(&mut local, d, nc, path)),
     };
     match second {
+        // Of a damaged global problem a local one may be read too, whose q is the head of H.
+        (e, Ok(_)) if goes_on(&local) && second_matrix(t, d * nc) => {
+            *t = global;
+            Err(e)
+        }
         (_, Ok(problem)) => {
             *t = local;
             Ok(problem)
@@ -44,6 +49,24 @@ pub(super) fn friction(t: &mut Tokens, path: &Path) -> Result<Friction, IoError>
             Err(e)
         }
     }
+}
+
+/// Whether numbers follow.
+fn goes_on(t: &Tokens) -> bool {
+    t.clone().real(String::new).is_ok()
+}
+
+/// Whether the head of another matrix with a column for each of the `m` rows of contacts follows the first one.
+fn second_matrix(t: &Tokens, m: usize) -> bool {
+    let mut ahead = t.clone();
+    let head = |t: &mut Tokens| -> Result<(), IoError> {
+        let n = size(t, "M")?;
+        matrix(t, "M", n, n)?;
+        t.one_of("", "", |storage| storage <= 2)?;
+        t.one_of("", "", |rows| rows == n)?;
+        t.one_of("", "", |columns| columns == m).map(|_| ())
+    };
+    head(&mut ahead).is_ok()
 }
 
 /// `M v = H r + q`, `u = Hᵀ v + b`.

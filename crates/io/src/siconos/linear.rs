@@ -16,21 +16,28 @@ pub(super) fn lcp(t: &mut Tokens, path: &Path) -> Result<Complementarity, IoErro
     let q = t.reals("q", n)?;
     let lcp =
         || Lcp::new(m.clone(), q.clone()).map(Complementarity::Lcp).map_err(IoError::problem(path));
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
+    let named = (name.contains("relay"), name.contains("lcp"));
+    let relay = |lower: &[f64], upper: &[f64]| {
+        let bounded = BoxLcp::new(m.clone(), q.clone(), lower.into(), upper.into());
+        bounded.map(Complementarity::Box).map_err(IoError::problem(path))
+    };
+    if named == (true, false) {
+        let (lower, upper) = (t.reals("l", n)?, t.reals("u", n)?);
+        return match t.word() {
+            Some(word) => Err(t.wrong("after u", "the end of the file", Some(word))),
+            None => relay(&lower, &upper),
+        };
+    }
     let mut rest = t.clone();
     let bounds = (rest.reals("l", n), rest.reals("u", n));
     let (Ok(lower), Ok(upper)) = bounds else { return lcp() };
     let fits = rest.word().is_none() && lower.iter().zip(&upper).all(|(l, u)| l <= u);
-    let name = path.file_stem().unwrap_or_default().to_string_lossy().to_lowercase();
-    let relay = || {
-        let bounded = BoxLcp::new(m.clone(), q.clone(), lower.clone(), upper.clone());
-        bounded.map(Complementarity::Box).map_err(IoError::problem(path))
-    };
-    match (name.contains("relay"), name.contains("lcp")) {
+    match named {
         _ if !fits => lcp(),
-        (true, false) => relay(),
         (false, true) => lcp(),
         // No variable of an LCP is negative.
-        _ if lower.iter().any(|&l| l < 0.0) => relay(),
+        _ if lower.iter().any(|&l| l < 0.0) => relay(&lower, &upper),
         _ => Err(IoError::data(
             path,
             "the numbers after q",

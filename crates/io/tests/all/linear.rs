@@ -77,6 +77,67 @@ fn dense(p: &Complementarity) -> Dense {
     .unwrap()
 }
 
+/// Of a file that somebody wrote, only the solution changes.
+#[test]
+fn a_solution_leaves_the_text_of_a_file_as_it_is() {
+    let folder = Folder::new();
+    let before =
+        "# two diodes\nkind = \"lcp\" # of circuits\nM = [\n  [2.0, 1e0], # first\n  [1, 2],\n]\n";
+    let (q, after) = ("q = [-5, -6.50]\n", "# the end\n");
+    let solution = |z: f64| StoredPoint::from(LcpPoint { z: vec![z, 0.1 + 0.2] });
+    let write = |path: &Path, z: f64| {
+        let mut file = ProblemFile::read(path).unwrap();
+        file.solution = Some(solution(z));
+        file.write_solution(path).unwrap();
+        let again = ProblemFile::read(path).unwrap();
+        assert_eq!(again.solution.unwrap().point, solution(z).point);
+        assert_eq!(again.problem, file.problem);
+        std::fs::read_to_string(path).unwrap()
+    };
+    for old in ["", "\n[solution]\nz = [ # a guess\n  0.5,\n  0.25,\n]\nw = [0, 0]\n"] {
+        let path = folder.put("a.toml", &format!("{before}{q}{after}{old}"));
+        let once = write(&path, 1.0);
+        assert!(once.starts_with(&format!("{before}{q}{after}")), "{once}");
+        assert_eq!(once.matches("[solution]").count(), 1, "{once}");
+        let twice = write(&path, 2.0);
+        assert_eq!(twice, once.replace("z = [1.0,", "z = [2.0,"));
+    }
+    // Before other tables, of dotted keys, in one line.
+    let vi = "kind = \"vi\"\nF = [\"x1 - 2\"]\n[solution]\nx = [0.5]\n[set] # of x\nbox = { lower = [0], upper = [1] }\n";
+    let path = folder.put("b.toml", vi);
+    let mut file = ProblemFile::read(&path).unwrap();
+    let Some(StoredPoint { point, .. }) = file.solution.clone() else { panic!() };
+    file.solution = Some(StoredPoint::from(point));
+    file.write_solution(&path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(
+        text.contains("[set] # of x\nbox = { lower = [0], upper = [1] }\n\n[solution]"),
+        "{text}"
+    );
+    let inline = format!("solution = {{ z = [0, 0] }}\n{before}{q}");
+    assert!(write(&folder.put("c.toml", &inline), 1.0).starts_with(before));
+    let dotted = format!("{before}solution.z = [0, 0]\n{q}");
+    assert!(write(&folder.put("d.toml", &dotted), 1.0).starts_with(&format!("{before}{q}")));
+}
+
+/// A pipe without a name that tells its format is read once.
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_read_once() {
+    let folder = Folder::new();
+    let path = folder.path("pipe");
+    let made = std::process::Command::new("mkfifo").arg(&path).status();
+    assert!(made.unwrap().success());
+    let text = "kind = \"lcp\"\nM = [[2]]\nq = [-1]\n";
+    let writer = {
+        let path = path.clone();
+        std::thread::spawn(move || std::fs::write(path, text).unwrap())
+    };
+    let Complementarity::Lcp(p) = linear(ProblemFile::read(&path).unwrap()) else { panic!() };
+    writer.join().unwrap();
+    assert_eq!(p.q, [-1.0]);
+}
+
 // ------------------------------------------------------------------------------------------------ round trips
 
 fn matrix(rows: usize, columns: usize) -> BoxedStrategy<Matrix> {
@@ -695,6 +756,14 @@ fn layouts_and_symmetries_of_matrix_market() {
             ["line 4", "end of the file"],
         ),
         ("%%MatrixMarket matrix coordinate real symmetric\n3 2 0\n", ["square", "3 × 2"]),
+        (
+            "%%MatrixMarket matrix coordinate real symmetric\n2 2 4\n1 1 2\n2 1 1\n1 2 1\n2 2 2\n",
+            ["line 5", "one triangle"],
+        ),
+        (
+            "%%MatrixMarket matrix coordinate real skew-symmetric\n2 2 2\n2 1 1\n2 2 3\n",
+            ["line 4", "no diagonal"],
+        ),
         ("%%MatrixMarket matrix coordinate real general\n2 2 0\n", ["q", "2 entries"]),
     ] {
         folder.refused("a.mtx", text, &all);
@@ -774,6 +843,18 @@ fn siconos_mixed_problems_and_relays() {
     folder.refused("a.dat", either, &["after q", "`lcp` or `relay`"]);
     assert!(matches!(folder.read("relay_a.dat", either), Complementarity::Box(_)));
     assert!(matches!(folder.read("lcp_a.dat", either), Complementarity::Lcp(_)));
+    // What the name says to be a relay problem is no LCP because its bounds are damaged.
+    let damaged = |bounds: &str| format!("2\n0\n2\n2\n2 2\n 1 2\n 3 4\n -5 -6\n{bounds}");
+    for (bounds, all) in [
+        ("", ["line 9, l[0]", "the end of the file"]),
+        ("-1 -1\n1\n", ["line 11, u[1]", "the end of the file"]),
+        ("-1 x\n1 1\n", ["line 9, l[1]", "`x`"]),
+        ("-1 nan\n1 1\n", ["[1]", "NaN"]),
+        ("1 1\n-1 2\n", ["[0]", "-1"]),
+        ("-1 -1\n1 1\n3\n", ["after u", "`3`"]),
+    ] {
+        folder.refused("relay_b.dat", &damaged(bounds), &all);
+    }
 }
 
 #[test]
@@ -837,6 +918,17 @@ fn siconos_problems_of_contacts() {
 
     global.truncate(global.len() - 8);
     folder.refused("a.dat", &global, &["b[2]", "a number", "the end of the file"]);
+    // Of as many freedoms as rows of contacts: with q the head of H and mu its next number it would be a local problem.
+    let square =
+        "3\n1\n0\n3\n3\n3 3\n2 0 0 0 2 0 0 0 2\n0\n3\n3\n3 3\n1 0 0 0 1 0 0 0 1\n-1 0 0\n0 0 0\n";
+    assert!(matches!(read(&format!("{square}0.3\n")), Friction::Global3(_)));
+    folder.refused("a.dat", square, &["mu[0]", "the end of the file"]);
+    folder.refused("a.dat", &format!("{square}-0.3\n"), &["mu", "-0.3"]);
+    folder.refused("a.dat", &format!("{square}0,3\n"), &["mu[0]", "`0,3`"]);
+    // A local one whose q looks like a head, with remarks after mu.
+    let local = "3\n1\n0\n3\n3\n3 3\n2 0 0 0 2 0 0 0 2\n0 3 3\n0.3\nby hand\n";
+    let Friction::Local3(p) = read(local) else { panic!() };
+    assert_eq!((p.q, p.mu), (vec![0.0, 3.0, 3.0], vec![0.3]));
     for (text, all) in [
         (
             "5\n1\n0\n1\n1\n1 1\n2\n0\n1\n5\n1 5\n1 1 1 1 1\n1\n1 1 1 1 1\n0.3\n",

@@ -230,8 +230,9 @@ fn accepted<const D: usize>(
     {
         let passes = tolerance > 0.0 && certified.passes(tolerance);
         counts[1] += usize::from(passes && problem.rows.is_none());
-        if let Some(bounds) = problem.accept(point, &mut gauge, tolerance) {
+        if let Some((bounds, steered)) = problem.accept(point, &mut gauge, tolerance) {
             counts[0] += 1;
+            assert!(steered <= bounds.merit(), "{what}: {steered:e}, {bounds:?}");
             assert!(passes, "{what}: {tolerance:e}, {bounds:?}, {certified:?}");
             assert!(bounds.relative >= exact * (1.0 - 1e-12), "{what}: {exact:e}, {bounds:?}");
             for (bound, found) in

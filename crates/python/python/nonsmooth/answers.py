@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import enum
 import html
 from functools import cached_property
@@ -90,6 +91,22 @@ def _tabled(columns: Mapping[str, Any]) -> Table:
     return made.view(Table)
 
 
+class Recorded:
+    """What an answer says, without its problem: what :mod:`pickle` takes to another process."""
+
+    FACTS = ("kind", "status", "solved", "message", "residual", "iterations", "factorisations", "seconds", "account")
+    FOUND = ("parts", "residuals", "counts", "worst", "history", "certificate", "table")
+
+    def __init__(self, native: Union[_nonsmooth.Answer, Recorded]) -> None:
+        self.__dict__.update((name, getattr(native, name)) for name in self.FACTS)
+        self._found = {name: getattr(native, name)() for name in self.FOUND}
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in self.FOUND:
+            raise AttributeError(name)
+        return lambda: copy.copy(self._found[name])
+
+
 class Answer:
     """What came of a solve: the best point found, whatever stopped it, and the judge's word on it.
 
@@ -97,8 +114,22 @@ class Answer:
     ``F``, of complementarity problems. They are not to be written to; take a copy.
     """
 
-    def __init__(self, native: _nonsmooth.Answer) -> None:
+    def __init__(self, native: Union[_nonsmooth.Answer, Recorded]) -> None:
         self._native = native
+
+    def __reduce__(self) -> Any:
+        # Without the problem, which a process that solves for another one was sent.
+        return Answer, (Recorded(self._native),)
+
+    def __copy__(self) -> Answer:
+        return Answer(self._native)
+
+    def __deepcopy__(self, memo: object) -> Answer:
+        return self.__copy__()
+
+    @property
+    def _point(self) -> Union[_nonsmooth.Answer, dict[str, Vector]]:
+        return self.parts if isinstance(self._native, Recorded) else self._native
 
     @property
     def status(self) -> Status:
@@ -270,7 +301,7 @@ def solve(
             arguments.seconds("time_limit", time_limit),
             None if max_iter is None else arguments.whole("max_iter", max_iter),
             arguments.whole("threads", threads),
-            warm_start._native if isinstance(warm_start, Answer) else warm_start,
+            warm_start._point if isinstance(warm_start, Answer) else warm_start,
             callback,
         )
     except _nonsmooth.Error as error:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _nonsmooth
-from .answers import Answer
+from .answers import Answer, Recorded
 from .problems import Matrix, Problem, Vector
 
 
@@ -117,6 +117,8 @@ def derivative(
     The judge has to accept the answer at ``tol`` (1e-6; the derivative has the accuracy of the answer, so solve with a small one). Cost: a sparse factorisation. Raises :class:`Error`
     where there is no derivative, as with impulses that are not unique, and where ``time_limit`` seconds of wall clock have passed; Ctrl-C ends it too.
     """
+    if isinstance(answer._native, Recorded):
+        raise _nonsmooth.Error("answer: expected one of this process, found one that was pickled; solve(problem, warm_start=answer) makes it one")
     native = _nonsmooth.Derivative(problem._native, answer._native, tol, time_limit)
     shapes = dict(native.data)
     if parameters is not None:

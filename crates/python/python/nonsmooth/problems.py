@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import os
+import tempfile
 from typing import TYPE_CHECKING, Any, Callable, ClassVar, Optional, Sequence, Union
 
 import numpy as np
@@ -47,7 +48,16 @@ class Problem:
         return self.__copy__()
 
     def __reduce__(self) -> Any:
-        raise TypeError("Problem: expected problem.save(path) and nonsmooth.read(path), found pickle")
+        # As its file has it, to the last bit.
+        ending = ".hdf5" if "friction" in self.kind else ".toml"
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "problem" + ending)
+            try:
+                self.save(path)
+            except _nonsmooth.Error as error:
+                raise TypeError(f"{type(self).__name__} cannot be pickled: {error}") from None
+            with open(path, "rb") as file:
+                return _unpickled, (ending, file.read())
 
     @classmethod
     def _of(cls, native: _nonsmooth.Problem) -> Problem:
@@ -63,15 +73,17 @@ class Problem:
         """
         self._native.update(parts)
 
-    def save(self, path: Path, answer: Optional[Answer] = None) -> None:
-        """Writes the problem, with the answer as its solution, in the format of the extension (.hdf5, .toml, .mtx, .nl, .csv)."""
-        self._native.save(path, None if answer is None else answer._native)
+    def save(self, path: Path, answer: object = None) -> None:
+        """Writes the problem in the format of the extension (.hdf5, .toml, .mtx, .nl, .csv), with a solution: an answer, or a point as :meth:`judge` takes it."""
+        from .answers import Answer
+
+        self._native.save(path, answer._point if isinstance(answer, Answer) else answer)
 
     def judge(self, point: object, tol: float = 1e-8) -> dict[str, Any]:
         """What the judge says of a point: an answer, a dictionary of its parts, or the array z (x; of contacts the impulses r)."""
         from .answers import Answer
 
-        return self._native.judge(point._native if isinstance(point, Answer) else point, tol)
+        return self._native.judge(point._point if isinstance(point, Answer) else point, tol)
 
     @property
     def kind(self) -> str:
@@ -366,6 +378,14 @@ _BY_KIND: dict[str, type[Problem]] = {
 }
 STATEMENTS: dict[str, str] = {kind["kind"]: kind["statement"] for kind in _nonsmooth.kinds()}
 """The statements of complementarity problems by their kinds."""
+
+
+def _unpickled(ending: str, content: bytes) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        path = os.path.join(folder, "problem" + ending)
+        with open(path, "wb") as file:
+            file.write(content)
+        return read(path)
 
 
 def read(path: Path) -> Any:

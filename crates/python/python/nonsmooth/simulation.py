@@ -40,7 +40,15 @@ def _number(value: object) -> object:
 
 def _own(table: Mapping[str, object]) -> dict[str, Any]:
     """What is said in a table, and stays so whatever the caller does with its arrays; nothing is said by None."""
-    return {key: copy.deepcopy(value) for key, value in table.items() if value is not None}
+    own: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            own[key] = _own(value)
+        elif isinstance(value, (list, tuple)) and any(one is None for one in value):
+            raise _nonsmooth.Error(f"{key}: expected numbers (infinite ones where there is no limit), found None")
+        elif value is not None:
+            own[key] = copy.deepcopy(value)
+    return own
 
 
 def _infinite(value: object, place: str) -> Iterator[tuple[str, float]]:
@@ -397,6 +405,16 @@ class Run:
         return self._native.stopped
 
     @property
+    def deep(self) -> int:
+        """Steps in which bodies overlapped by more than a tenth of the smaller one: shapes may have passed through each other, though every step is solved."""
+        return self._native.deep
+
+    @property
+    def first_deep(self) -> Optional[float]:
+        """When the first of these steps ended, s."""
+        return self._native.first_deep
+
+    @property
     def bodies(self) -> list[str]:
         """The names of the bodies."""
         return self._native.bodies
@@ -511,7 +529,8 @@ class Run:
         word = "solved" if self.solved else "stopped" if self.stopped else "not solved"
         steps = len(self.steps["time"])
         end = self.steps["time"][-1] if steps else self.simulation.t
-        return f"<Run: {len(self.bodies)} bodies, {steps} steps to t = {end:.6g} s, {word}>"
+        deep = f", but bodies overlap deeply in {self.deep} of them" if self.deep else ""
+        return f"<Run: {len(self.bodies)} bodies, {steps} steps to t = {end:.6g} s, {word}{deep}>"
 
     def _repr_html_(self) -> str:
         page = base64.b64encode(self.html().encode()).decode()

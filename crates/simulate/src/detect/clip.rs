@@ -24,6 +24,8 @@ const INSIDE: f64 = 1e-9;
 const SAME: f64 = 1e-6;
 /// By which share of the size edges may miss each other and touch.
 const BESIDE: f64 = 1e-4;
+/// Faces whose normals differ by less than this may touch elsewhere too than where two of their edges cross.
+const FACING: f64 = 0.1;
 /// Edges that are parallel up to this have no common normal.
 const PARALLEL: f64 = 1e-6;
 
@@ -117,6 +119,24 @@ impl Clip {
                 if edges.separation > best + margin * size {
                     axis = Axis::Edges(edges.i, edges.j);
                     self.cross(a, b, &edges, prediction, &mut found);
+                    // Of faces that nearly lie on each other one point would be left, about which they rock while all else sinks.
+                    let (n, m) = (reference.1.normals[face], incident.1.normals[other]);
+                    let facing = norm(cross(n, m)) < FACING && dot(n, m) < 0.0;
+                    if facing && dot(edges.normal, n).abs() > 1.0 - FACING {
+                        let crossing = [Feature::Edge(edges.i), Feature::Edge(edges.j)];
+                        self.faces(
+                            reference,
+                            incident,
+                            (face, other),
+                            by_a,
+                            prediction,
+                            |pair, at| {
+                                if pair != crossing {
+                                    found(pair, at);
+                                }
+                            },
+                        );
+                    }
                     return Some(axis);
                 }
             }

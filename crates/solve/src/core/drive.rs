@@ -515,11 +515,12 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
         // What was cut short in a kernel is begun anew.
         let earlier = kept.take().filter(|k| !k.torn);
         let gauge_before = gauge.take().filter(|_| lent || earlier.is_some());
-        let beside = budget::threads() > 1
+        let beside = gauge_before.is_none()
+            && budget::threads() > 1
             && problem.burden() >= BESIDE
             && !problem.asks_functions()
             && earlier.is_none();
-        let mut meter = Meter::start(begun, limits);
+        let before = beside.then(|| Meter::start(begun, limits));
         let gauge_anew = || uncounted(|| problem.gauge()).map(Box::new);
         let (judge, made) = match gauge_before {
             Some(gauge) if lent => (Ok(gauge), None),
@@ -531,10 +532,8 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
             }
             None => (gauge_anew(), None),
         };
-        if made.is_none() {
-            // The judge's own preparation is not part of the solve's time.
-            meter = Meter::start(begun, limits);
-        }
+        // The judge's own preparation is not part of the solve's time.
+        let meter = before.unwrap_or_else(|| Meter::start(begun, limits));
         let judge: &mut P::Gauge = match judge {
             Ok(judge) => gauge.insert(judge),
             Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
@@ -558,7 +557,7 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
                     let Kept { best, tidied, .. } = &mut *k;
                     P::copy_point(point, best);
                     let mut visit = Judge::new(judge, best, tidied, history, meter, false);
-                    visit.judge(problem, point, 0, limits.tolerance, false);
+                    visit.judge(problem, point, 0, limits.tolerance, Look::Plainly);
                     let measure = visit.last;
                     if measure.passes(limits.tolerance) {
                         P::copy_point(best, point);
@@ -669,7 +668,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         self.solver.aim(self.limits.tolerance, self.work);
         self.solver.record(self.limits.trace, self.work);
         self.solver.start(self.problem, point, self.work);
-        self.judge(point, 0, false);
+        self.judge(point, 0, Look::Plainly);
         let mut estimate = f64::NAN;
         let mut since_judged = 0;
         let mut claim = None;
@@ -688,7 +687,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             if let Some(limit) = self.limit(iterations) {
                 if since_judged > 0 {
                     // A last look: the steps since the last one may have been enough.
-                    self.judge(point, iterations, false);
+                    self.judge(point, iterations, Look::Plainly);
                     if self.judge.last.passes(self.limits.tolerance) {
                         break Status::Solved;
                     }
@@ -717,10 +716,15 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                     other => claim = (!self.scope.raised()).then_some(other),
                 },
             }
-            let due = since_judged >= self.solver.check_every(self.work)
-                || self.judge.calibration.promises(estimate, self.limits.tolerance);
+            let promised = self.judge.calibration.promises(estimate, self.limits.tolerance);
+            let due = promised || since_judged >= self.solver.check_every(self.work);
             if due || claim.is_some() {
-                self.judge(point, iterations, claim.is_some());
+                let look = match claim {
+                    Some(_) => Look::Closely,
+                    None if promised => Look::Promised,
+                    None => Look::Plainly,
+                };
+                self.judge(point, iterations, look);
                 self.judge.calibration.learn(self.judge.last.merit(), estimate);
                 since_judged = 0;
                 if !self.judge.last.merit().is_finite() {
@@ -771,11 +775,10 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         self.judge.meter.outcome(status, measure, iterations)
     }
 
-    /// `closely`: a solver's last word is looked at in doubled precision, even if it seems no solution.
-    fn judge(&mut self, point: &mut P::Point, iteration: usize, closely: bool) {
+    fn judge(&mut self, point: &mut P::Point, iteration: usize, look: Look) {
         self.solver.publish(self.problem, point, self.work);
         let tolerance = self.limits.tolerance;
-        let better = self.judge.judge(self.problem, point, iteration, tolerance, closely);
+        let better = self.judge.judge(self.problem, point, iteration, tolerance, look);
         if better && self.observer.keeps_best() {
             self.observer.best(self.judge.best, &self.judge.best_measure);
         }
@@ -908,6 +911,28 @@ impl Halved {
     }
 }
 
+/// How a point is looked at.
+#[derive(Clone, Copy, PartialEq)]
+enum Look {
+    /// To steer by, and if it looks solved again to decide by.
+    Plainly,
+    /// To decide by at once: the solver's estimate promises a solution.
+    Promised,
+    /// In doubled precision even if it seems no solution: a solver's last word.
+    Closely,
+}
+
+/// What a look found beside the residuals.
+#[derive(Default)]
+struct Seen {
+    /// The residuals to decide by, where they were needed.
+    certified: Option<Measure>,
+    /// They are those of the point in `tidied`.
+    tidied: bool,
+    /// The residual to steer by: what a bound adds to it is no part of how it falls.
+    steered: Option<f64>,
+}
+
 /// The judge's visits, the best point among them, and the history.
 struct Judge<'a, P: Problem> {
     gauge: &'a mut P::Gauge,
@@ -929,6 +954,8 @@ struct Judge<'a, P: Problem> {
     own_again: usize,
     own_wait: usize,
     calibration: Calibration,
+    /// No promise has been broken yet: a broken one costs a look in vain.
+    trusting: bool,
     visited: bool,
 }
 
@@ -957,6 +984,7 @@ impl<'a, P: Problem> Judge<'a, P> {
             own_again: 0,
             own_wait: 0,
             calibration: Calibration::new(),
+            trusting: true,
             visited: false,
         }
     }
@@ -968,43 +996,18 @@ impl<'a, P: Problem> Judge<'a, P> {
         point: &P::Point,
         iteration: usize,
         tolerance: f64,
-        closely: bool,
+        look: Look,
     ) -> bool {
-        self.last = problem.measure(point, self.gauge);
-        let (mut certified, mut tidied) = (None, false);
-        // What a bound adds to it is no part of how the residual falls.
-        let mut steered = None;
-        if !self.last.passes(tolerance) {
-            // What is zero but for rounding may hide how good the rest is.
-            P::copy_point(point, self.tidied);
-            if problem.tidy(self.tidied, self.gauge, true) {
-                let measure = problem.measure(self.tidied, self.gauge);
-                if measure.is_better_than(&self.last) {
-                    (self.last, tidied) = (measure, true);
-                }
-                if measure.passes(tolerance) {
-                    // Back to the point that is to be tidied for good.
-                    let _ = problem.measure(point, self.gauge);
-                }
+        let promised = look == Look::Promised && self.trusting;
+        let accepted = promised.then(|| problem.accept(point, self.gauge, tolerance)).flatten();
+        self.trusting &= !promised || accepted.is_some();
+        let seen = match accepted {
+            Some((bounds, steered)) => {
+                self.last = bounds;
+                Seen { certified: Some(bounds), tidied: false, steered: Some(steered) }
             }
-        }
-        if let (Some(own), true) = (self.own, iteration < self.own_again) {
-            // Refused a moment ago for a single contact: as yet as good as then.
-            self.last.own = Some(own);
-        } else if closely || self.last.passes(tolerance) {
-            // What looks solved is looked at again, in doubled precision.
-            let plain = self.last.merit();
-            match problem.accept(point, self.gauge, tolerance) {
-                Some(bounds) => (self.last, steered) = (bounds, Some(plain)),
-                None => (self.last, tidied) = self.certify(problem, point, tolerance),
-            }
-            certified = Some(self.last);
-            if self.last.fails_own_only(tolerance) {
-                self.own = self.last.own;
-                self.own_wait = (2 * self.own_wait).clamp(1, MOST_WAIT);
-                self.own_again = iteration + self.own_wait;
-            }
-        }
+            None => self.look(problem, point, iteration, tolerance, look),
+        };
         // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
         let mut better = !self.visited
             || self.latest
@@ -1016,15 +1019,59 @@ impl<'a, P: Problem> Judge<'a, P> {
         }
         if better {
             self.best_measure = self.last;
-            self.certified = certified;
-            P::copy_point(if tidied { self.tidied } else { point }, self.best);
+            self.certified = seen.certified;
+            P::copy_point(if seen.tidied { self.tidied } else { point }, self.best);
         }
         let merit = self.last.merit();
-        let relative = steered.unwrap_or(merit);
+        let relative = seen.steered.unwrap_or(merit);
         let sample = Sample { iteration, seconds: self.meter.seconds(), relative };
         self.history.note(sample, merit <= self.best_measure.merit());
         self.visited = true;
         better
+    }
+
+    /// The residuals of the point, in `last`: to steer by, and to decide by where it looks solved or is a last word.
+    fn look(
+        &mut self,
+        problem: &P,
+        point: &P::Point,
+        iteration: usize,
+        tolerance: f64,
+        look: Look,
+    ) -> Seen {
+        self.last = problem.measure(point, self.gauge);
+        let mut seen = Seen::default();
+        if !self.last.passes(tolerance) {
+            // What is zero but for rounding may hide how good the rest is.
+            P::copy_point(point, self.tidied);
+            if problem.tidy(self.tidied, self.gauge, true) {
+                let measure = problem.measure(self.tidied, self.gauge);
+                if measure.is_better_than(&self.last) {
+                    (self.last, seen.tidied) = (measure, true);
+                }
+                if measure.passes(tolerance) {
+                    // Back to the point that is to be tidied for good.
+                    let _ = problem.measure(point, self.gauge);
+                }
+            }
+        }
+        if let (Some(own), true) = (self.own, iteration < self.own_again) {
+            // Refused a moment ago for a single contact: as yet as good as then.
+            self.last.own = Some(own);
+        } else if look == Look::Closely || self.last.passes(tolerance) {
+            // What looks solved is looked at again, in doubled precision.
+            match problem.accept(point, self.gauge, tolerance) {
+                Some((bounds, steered)) => (self.last, seen.steered) = (bounds, Some(steered)),
+                None => (self.last, seen.tidied) = self.certify(problem, point, tolerance),
+            }
+            seen.certified = Some(self.last);
+            if self.last.fails_own_only(tolerance) {
+                self.own = self.last.own;
+                self.own_wait = (2 * self.own_wait).clamp(1, MOST_WAIT);
+                self.own_again = iteration + self.own_wait;
+            }
+        }
+        seen
     }
 
     /// [`closely`] of the point last measured.
@@ -1056,12 +1103,13 @@ impl<'a, P: Problem> Judge<'a, P> {
     }
 
     fn progress(&self, iteration: usize) -> Progress {
-        let seconds = self.meter.seconds();
-        let judged = self.history.samples().last().copied().unwrap_or(Sample {
-            iteration,
-            seconds,
-            relative: f64::NAN,
-        });
+        let last = self.history.samples().last().copied();
+        // The clock is looked at once for a step.
+        let seconds = match last {
+            Some(sample) if sample.iteration == iteration => sample.seconds,
+            _ => self.meter.seconds(),
+        };
+        let judged = last.unwrap_or(Sample { iteration, seconds, relative: f64::NAN });
         Progress { judged, best: self.best_measure.merit(), iteration, seconds }
     }
 }

@@ -180,8 +180,10 @@ impl<P: Problem> Tally<P> {
     fn take(&mut self, point: P::Point, outcome: &Outcome) {
         self.iterations += outcome.iterations;
         self.factorisations += outcome.factorisations;
+        // What is solved is what was found, though another point may have a smaller merit: `own` is no part of it.
+        let solved = outcome.status == Status::Solved;
         let better = |(_, best): &(P::Point, Measure)| outcome.measure.is_better_than(best);
-        if self.best.as_ref().is_none_or(better) {
+        if solved || self.best.as_ref().is_none_or(better) {
             self.best = Some((point, outcome.measure));
             self.bests += 1;
         }

@@ -44,6 +44,8 @@ struct Lifted<'a, P: Problem, R: Reformulation<P>> {
     /// The best point so far, and its measure.
     best: (&'a mut P::Point, Measure),
     observer: &'a mut dyn Observer<P>,
+    /// The tolerance of the problem itself.
+    tolerance: f64,
     /// Steps before this try.
     iterations: usize,
 }
@@ -56,7 +58,8 @@ impl<P: Problem, R: Reformulation<P>> Lifted<'_, P, R> {
             true => self.problem.certify(&self.trial, self.gauge),
             false => self.problem.measure(&self.trial, self.gauge),
         };
-        if measure.is_better_than(&self.best.1) {
+        // What passes counts as the best: `own` is no part of the merit.
+        if measure.passes(self.tolerance) || measure.is_better_than(&self.best.1) {
             P::copy_point(&self.trial, self.best.0);
             self.best.1 = measure;
             if self.observer.keeps_best() {
@@ -147,6 +150,7 @@ where
             trial,
             best: (point, start),
             observer,
+            tolerance: limits.tolerance,
             iterations,
         };
         let status = loop {

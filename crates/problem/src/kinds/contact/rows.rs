@@ -65,6 +65,19 @@ impl Bounds {
         c.min(w * (lambda - l)).max(w * (lambda - u))
     }
 
+    /// What [`residual`](Self::residual) is compared with, of a velocity whose terms have this size. An impulse that is not on the bound that it has to be on is wrong by its part of the
+    /// bounds, however fast the row moves: a motor that never reaches its velocity.
+    pub(crate) fn size_of(&self, row: usize, (lambda, c): (f64, f64), w: f64, size: f64) -> f64 {
+        let bounds = self.of(row).map(|b| if b.is_finite() { b.abs() } else { 0.0 });
+        let stated = bounds[0].max(bounds[1]);
+        // The impulse is no term of c, but may be all there is.
+        let terms = size + (w * lambda).abs();
+        match self.residual(row, lambda, c, w) == c || stated == 0.0 {
+            true => terms,
+            false => terms.min(w * (stated + lambda.abs())),
+        }
+    }
+
     /// The lengths fit and the bounds do not cross.
     pub(crate) fn validate(&self, rows: usize, meaning: &str) -> Result<(), ProblemError> {
         match self.lower.is_empty() && self.upper.is_empty() {

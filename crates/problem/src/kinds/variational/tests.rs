@@ -168,6 +168,58 @@ fn a_start_far_off_makes_no_error_small() {
     }
 }
 
+/// A bound that is as good as none counts as none.
+#[test]
+fn a_far_bound_makes_no_error_small() {
+    let solved = |f: &[&str], set: &Set, start: &[f64], x: &[f64]| {
+        let texts: Vec<String> = f.iter().map(|f| (*f).into()).collect();
+        let field = Expressions::parse(&texts, &[]).unwrap();
+        let problem = Vi::new(field, set.clone(), start.to_vec()).unwrap();
+        problem.judge(&LcpPoint { z: x.to_vec() }, 1e-8).unwrap().solved
+    };
+    for far in [1e3, 1e8, 1e9, 1e12, 1e20, 1e300] {
+        for set in [[-5.0, far], [-far, far]] {
+            let set = Set::Box { lower: vec![set[0]], upper: vec![set[1]] };
+            for start in [7.0, 0.0] {
+                for (x, right) in [(7.0, false), (0.0, false), (1.0, true)] {
+                    assert_eq!(solved(&["x1 - 1"], &set, &[start], &[x]), right, "{x}, {far}");
+                }
+            }
+        }
+        let ball = Set::Ball { centre: vec![0.0], radius: 3.0 };
+        let far_box = Set::Box { lower: vec![0.0], upper: vec![far] };
+        let (both, f) = (Set::Product(vec![ball, far_box]), ["x1 + x1^3 - 2", "x2 - 1"]);
+        assert!(!solved(&f, &both, &[0.5, 3.0], &[0.5, 3.0]));
+        assert!(solved(&f, &both, &[0.5, 3.0], &[1.0, 1.0]));
+        let rows = Csc::from_triplets(2, 1, [(0, 0, -1.0), (1, 0, 1.0)].into_iter()).unwrap();
+        let set = Set::inequalities(rows, vec![5.0, far]);
+        let f = ["x1^3 + x1 + 1"];
+        assert!(!solved(&f, &set, &[3.0], &[3.0]));
+        assert!(solved(&f, &set, &[3.0], &[-0.682_327_803_828_019_3]));
+        // On the bound that holds, with a rounding error of what was computed there.
+        let set = Set::Box { lower: vec![0.0], upper: vec![far] };
+        assert!(solved(&["x1 + 1"], &set, &[0.0], &[0.0]));
+        assert!(solved(&["x1 + 1"], &set, &[0.0], &[1e-17]));
+        assert!(solved(&["x1 + 1"], &set, &[2.0], &[1e-17]));
+    }
+}
+
+/// From whatever start over a set without a size, of a function that cannot be asked at zero.
+#[test]
+fn no_start_makes_the_errors_of_a_function_small() {
+    let value = |x: &[f64], f: &mut [f64]| {
+        f.copy_from_slice(&[x[0] + 0.3 * x[1] - 2.3, 0.5 * x[1] - 0.3 * x[0] + 0.1]);
+    };
+    for size in [1.0, 1e10, 1e20, 1e30, 1e50, 1e150] {
+        let field = Differences::new(Pattern::dense(2), value).unwrap();
+        let cone = Set::SecondOrderCone { dimension: 2 };
+        let problem = Vi::new(field, cone, vec![-0.25 * size, size]).unwrap();
+        let solved = |z: [f64; 2]| problem.judge(&LcpPoint { z: z.to_vec() }, 1e-8).unwrap().solved;
+        assert!(!solved([4659.0, -3271.0]) && !solved([20.0, 10.0]), "from {size}");
+        assert!(solved([2.0, 1.0]), "from {size}");
+    }
+}
+
 #[test]
 fn mistakes_are_named() {
     let field = || Expressions::parse(&["x1".into(), "x2".into()], &[]).unwrap();

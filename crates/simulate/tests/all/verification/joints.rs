@@ -292,6 +292,20 @@ fn a_motor_has_its_torque_and_no_more_and_keeps_its_speed() {
     near(simulation.joints()[0].moment[2], 0.0, 1e-12);
 }
 
+/// A motor that never reaches its velocity is one of constant torque, however far that velocity is: φ = M t²/2J.
+#[test]
+fn a_motor_out_of_reach_of_its_speed_gives_its_torque() {
+    const H: f64 = 1e-3;
+    for velocity in [10.0, 1e4, 1e8, -1e12, 1e100] {
+        let motor = Some(Motor::Velocity { velocity, max: 0.4 });
+        let mut simulation = wheel(Drive { motor, ..Drive::along(Coordinate::Angle) });
+        let report = simulation.run(0.1, H, &mut ()).unwrap();
+        assert!(report.is_solved(), "{velocity}: {report}");
+        near(simulation.state().spin[0][2], velocity.signum() * 0.08, 1e-9);
+        near(simulation.joints()[0].moment[2], velocity.signum() * 0.4 * H, 1e-12);
+    }
+}
+
 #[test]
 fn a_motor_to_a_position_is_stable_for_any_stiffness() {
     let spring = Spring { stiffness: 1e9, damping: 1e8, rest: 0.3 };

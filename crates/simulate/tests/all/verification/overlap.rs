@@ -27,6 +27,30 @@ fn two_balls_are_moved_apart_by_their_masses() {
     assert_eq!(simulation.state().velocity, [[0.0; 3]; 2]);
 }
 
+/// A box that falls on its equal, tilted a little, ends on it, at most about a step of its fall deep: edges that cross hide no faces that nearly lie on each other.
+#[test]
+fn a_box_that_falls_on_a_box_ends_on_it() {
+    const H: f64 = 2e-3;
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
+    let half = [0.1, 0.1, 0.05];
+    for drop in 0..12 {
+        let mut any = |most: f64| rng.random_range(-most..most);
+        let mut world = world(0.4, 0.0);
+        world.add(Body::floor());
+        let solid = || Body::solid(Shape::Box { half }, 1000.0).unwrap();
+        world.add(solid().at([0.0, 0.0, 0.05]));
+        let tilt = Rotation::about([any(1.0), any(1.0), 0.1], 0.12);
+        let turn = tilt.after(Rotation::about([0.0, 0.0, 1.0], any(0.9)));
+        let upper = world.add(solid().turned(turn).at([any(0.02), any(0.02), 0.21]));
+        let mut simulation = simulation(world);
+        let report = simulation.run(1.5, H, &mut ()).unwrap();
+        assert!(report.is_solved() && report.deep == 0, "{drop}: {report}");
+        let speed = (2.0 * G * 0.06_f64).sqrt();
+        let z = x(&simulation, upper)[2];
+        assert!((z - 0.15).abs() <= 2.0 * H * speed, "{drop}: {z}");
+    }
+}
+
 #[test]
 fn a_heap_of_solids_thrown_together_is_sorted_out() {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(6);

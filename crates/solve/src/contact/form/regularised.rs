@@ -99,7 +99,12 @@ impl<P: Problem> Problem for Regularised<P> {
         self.base.certify(point, gauge)
     }
 
-    fn accept(&self, point: &P::Point, gauge: &mut P::Gauge, tolerance: f64) -> Option<Measure> {
+    fn accept(
+        &self,
+        point: &P::Point,
+        gauge: &mut P::Gauge,
+        tolerance: f64,
+    ) -> Option<(Measure, f64)> {
         self.base.accept(point, gauge, tolerance)
     }
 

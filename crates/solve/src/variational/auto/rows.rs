@@ -281,7 +281,7 @@ impl Rows {
                 relative: measure.relative,
             });
             let before = best;
-            if measure.is_better_than(&best) {
+            if measure.passes(limits.tolerance) || measure.is_better_than(&best) {
                 point.z.copy_from_slice(&x.z);
                 best = measure;
                 if observer.keeps_best() {

@@ -17,9 +17,9 @@ const FAR: [f64; 2] = [(1_u64 << 40) as f64, (1_u64 << 50) as f64];
 /// Where a row that vanishes with all its terms counts as large as it was elsewhere, it is asked on the way to zero and away from it, in steps of a factor 4, where it no longer becomes smaller: sizes
 /// that fall by less than this from one point to the next. So near to zero, in powers of two, and so far.
 const LEVEL: f64 = 0.9;
-const STEPS: [i32; 2] = [60, -50];
-/// Then in longer steps, down to the smallest numbers.
-const LONGER_STEPS: [i32; 8] = [64, 72, 88, 120, 184, 312, 568, 1020];
+const STEPS: i32 = 60;
+/// Then in longer steps, down to the smallest numbers and up to the largest, of which the last two are near each other; where a size rises along one of them, in short ones again.
+const LONGER_STEPS: [i32; 9] = [64, 72, 88, 120, 184, 312, 568, 1016, 1020];
 /// Changes of the variables, in parts of their size, along which a Jacobian is held against F. So far at least is a point from a solution that its own distance from a pole makes seem near:
 /// of `3 − 1/(x − 1)` close to 1, a change of x by as little as that distance changes F by all that it is.
 const STEP: f64 = 1.0 / 1024.0;
@@ -227,36 +227,45 @@ impl Units {
     ) {
         let n = start.len();
         let mut least = vec![f64::INFINITY; n + 1];
-        for last in STEPS {
-            let inwards = last > 0;
+        let whole = [&self.own[..], &[self.largest.0]].concat();
+        for inwards in [true, false] {
+            let sign = if inwards { 1 } else { -1 };
             // Where nothing is between, away from zero itself.
             let from = if zero == start { vec![0.0; n] } else { zero.clone() };
             if inwards && zero == start || start == from {
                 continue;
             }
-            let short = (1..=last.abs() / 2).map(|k| 2 * k * last.signum());
-            let steps = short.chain(LONGER_STEPS.into_iter().filter(|_| inwards));
-            let mut before: Vec<f64> = self.own.clone();
-            before.push(self.largest.0);
-            for k in steps {
-                let part = 2.0_f64.powi(-k);
+            let mut before = whole.clone();
+            let mut sizes_at = |k: i32| {
+                let part = 2.0_f64.powi(-sign * k);
                 let point: Vec<f64> =
                     from.iter().zip(&start).map(|(z, s)| z + part * (s - z)).collect();
-                let finite = point.iter().all(|x| x.is_finite());
-                if budget::over()
-                    || !finite
-                    || !tentatively(|| terms.look(field.pattern(), &point, !self.expressions))
-                {
-                    break;
-                }
+                let asked = !budget::over()
+                    && point.iter().all(|x| x.is_finite())
+                    && tentatively(|| terms.look(field.pattern(), &point, !self.expressions));
                 let largest = terms.sizes.iter().fold(0.0_f64, |most, d| most.max(*d));
-                let now = terms.sizes.iter().copied().chain([largest]);
-                for ((least, before), now) in least.iter_mut().zip(&mut before).zip(now) {
-                    if now >= LEVEL * *before && *before > 0.0 {
-                        *least = least.min(now.max(*before));
+                asked.then(|| [&terms.sizes[..], &[largest]].concat())
+            };
+            let short = (1..=STEPS / 2).map(|k| 2 * k);
+            let mut last = 0;
+            for k in short.chain(LONGER_STEPS) {
+                let Some(now) = sizes_at(k) else { break };
+                // Between the two there may be a size that is a unit, and smaller than those that are known.
+                let least_of = least.iter().zip(&whole).map(|(least, d)| least.min(VANISHING * d));
+                let mut rows = now.iter().zip(&before).zip(least_of);
+                let rises = rows.any(|((now, before), least)| {
+                    *before > 0.0 && *now > 2.0 * before && *before < least
+                });
+                let between = (last + 2..k).step_by(2).filter(|_| rises).filter_map(&mut sizes_at);
+                for now in between.chain([now]) {
+                    for ((least, before), now) in least.iter_mut().zip(&before).zip(&now) {
+                        if *now >= LEVEL * before && *before > 0.0 {
+                            *least = least.min(now.max(*before));
+                        }
                     }
-                    *before = now;
+                    before = now;
                 }
+                last = k;
             }
         }
         // These are no sizes of the point last looked at any more.

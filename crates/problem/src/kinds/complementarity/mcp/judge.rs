@@ -14,8 +14,8 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller; where a row is smaller than that ten-thousandth, also the size on the way to these points where it no longer falls, if that is a smaller
 /// part: a start far off, or near a pole at zero, makes nothing small. Of a row that along a change of x by a
 /// thousandth does not change as J says, that change counts in place of the terms that it should have had. That a variable is d away from a bound
-/// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the
-/// finite bounds. Therefore neither changes when rows or variables are multiplied by numbers.
+/// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the modulus of
+/// that bound. Therefore neither changes when rows or variables are multiplied by numbers.
 ///
 /// | field of [`Measure`] | formula |
 /// | --- | --- |
@@ -23,7 +23,7 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// | `dual` | the largest error of an F whose sign no bound allows |
 /// | `complementarity` | the largest error of a pair: the smaller of that of F and that of the distance from the bound that the sign of F asks for |
 /// | `relative` | the largest of the three; **decides** |
-/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing; where the error is that of a distance, the smaller of that of F and the distance over the largest of `|start_j|` and the finite bounds |
+/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing; where the error is that of a distance, the smaller of that of F and the distance over the larger of `|start_j|` and the modulus of the bound |
 /// | `absolute`, `literature`, `siconos` | the natural residual `‖x − mid(l, u, x − F(x))‖_∞` |
 ///
 /// [`certify`](Problem::certify) evaluates sums, products, quotients and roots of expressions in doubled precision.
@@ -32,26 +32,28 @@ pub struct McpGauge {
     /// D at the point last measured.
     scales: Vec<f64>,
     units: Units,
-    /// The unit of each variable, but for its own value.
+    /// `|start|`
     lengths: Vec<f64>,
     /// What a distance counts at the point last measured.
     effects: Vec<f64>,
 }
 
+/// The unit of a variable, but for its own value: the larger of its start and a bound.
+fn unit_of(start: f64, bound: f64) -> f64 {
+    if bound.is_finite() { start.max(bound.abs()) } else { start }
+}
+
 impl McpGauge {
     pub(super) fn new(problem: &Mcp) -> Self {
         let n = problem.dim();
-        let finite = |x: f64| if x.is_finite() { x.abs() } else { 0.0 };
         let start = problem.origin().z;
-        let length =
-            |i: usize| finite(problem.lower[i]).max(finite(problem.upper[i])).max(start[i].abs());
         let zero = problem.lower.iter().zip(&problem.upper).map(|(l, u)| 0.0_f64.max(*l).min(*u));
         let mut terms = Terms::new(&*problem.F);
         Self {
             units: Units::new(&*problem.F, &mut terms, &start, zero.collect()),
             terms,
             scales: vec![0.0; n],
-            lengths: (0..n).map(length).collect(),
+            lengths: start.iter().map(|s| s.abs()).collect(),
             effects: vec![0.0; n],
         }
     }
@@ -76,7 +78,9 @@ impl McpGauge {
             }
         }
         for (j, effect) in effects.iter_mut().enumerate().filter(|(_, e)| **e == 0.0) {
-            let length = lengths[j].max(x[j].abs());
+            // A bound that nothing asks for, however far, makes no distance small.
+            let towards = if terms.f[j] > 0.0 { problem.lower[j] } else { problem.upper[j] };
+            let length = unit_of(lengths[j], towards).max(x[j].abs());
             *effect = if length > 0.0 { 1.0 / length } else { 0.0 };
         }
         true
@@ -121,7 +125,7 @@ impl McpGauge {
             let mut share_of_own = share(pair.w, unit);
             if of_f < pair.error {
                 // Nor is a distance none for a derivative that hardly feels it, where F is as large as it was: on the bound F may be another.
-                let length = self.lengths[i];
+                let length = unit_of(self.lengths[i], pair.towards());
                 let way = (pair.z - pair.towards()).abs() / length;
                 share_of_own = if length > 0.0 { share_of_own.min(way) } else { 0.0 };
             } else if near > 0.0 && near < unit {

@@ -251,6 +251,32 @@ fn a_start_far_off_or_at_a_pole_makes_no_error_small() {
     }
 }
 
+/// A bound that nothing asks for is no unit, however far, nor a pole or a start that is farther than the largest powers of two that are stepped through.
+#[test]
+fn far_bounds_and_extreme_starts_make_no_error_small() {
+    let inf = f64::INFINITY;
+    for (f, [lower, upper], start, wrong, right) in [
+        ("1 - x^2", [-5.0, 1e20], 0.0, 0.0, 1.0),
+        ("x^2 - 1", [-1e9, 5.0], 0.0, 0.0, -1.0),
+        ("1/x - 1", [-inf, inf], 1e-20, 0.0207, 1.0),
+        ("x - 1/x", [-inf, inf], 1e102, 2.1e52, 1.0),
+        ("x - 1/x", [-inf, inf], 1e102, 100.0, 1.0),
+        ("x - 1", [-inf, inf], 1e180, 1e100, 1.0),
+    ] {
+        let field = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
+        let problem = Mcp::new(field, vec![lower], vec![upper], vec![start]).unwrap();
+        let solved = |x: f64| problem.judge(&LcpPoint { z: vec![x] }, 1e-8).unwrap().solved;
+        assert!(!solved(wrong) && solved(right), "{f} at {wrong}");
+    }
+    let pole = closures(|x| 1.0 / x - 1.0, |x| -1.0 / (x * x));
+    let line = closures(|x| x - 1.0, |_| 1.0);
+    for (field, start, all) in [(pole, 1e-15, [-1e16, 1e-3]), (line, 1e180, [1e100, 1e3])] {
+        let problem = Mcp::new(field, vec![-inf; 2], vec![inf; 2], vec![start; 2]).unwrap();
+        let solved = |x: f64| problem.judge(&LcpPoint { z: vec![x; 2] }, 1e-8).unwrap().solved;
+        assert!(!all.into_iter().any(solved) && solved(1.0), "from {start}");
+    }
+}
+
 #[test]
 fn a_point_is_asked_once() {
     use std::sync::Arc;

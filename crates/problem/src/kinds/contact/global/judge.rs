@@ -358,10 +358,10 @@ impl GlobalGauge {
                 let (left, size) = if b.bounds.is_free(j) {
                     (sum, size)
                 } else {
-                    // The impulse is no term of c, but may be all there is.
                     let w = of_impulse(problem, &b.G, j);
                     let lambda = point.lambda[j];
-                    (b.bounds.residual(j, lambda, sum, w), size + (w * lambda).abs())
+                    let left = b.bounds.residual(j, lambda, sum, w);
+                    (left, b.bounds.size_of(j, (lambda, sum), w, size))
                 };
                 law.loads.excused(problem.contacts() + j, left, size, typical * weight)
             });

@@ -147,10 +147,20 @@ impl LawGauge {
     /// before the data do.
     pub(crate) fn measure<T: Real, L: Law<D>, const D: usize>(
         &self,
-        (r, u): (&[f64], &[T]),
+        at: (&[f64], &[T]),
         care: Option<Care<impl Fn(usize) -> f64>>,
         law: impl Fn(usize) -> L,
     ) -> Measure {
+        self.measure_apart(at, care, law).0
+    }
+
+    /// As [`measure`](Self::measure), and the relative residual without what is left in doubt.
+    pub(crate) fn measure_apart<T: Real, L: Law<D>, const D: usize>(
+        &self,
+        (r, u): (&[f64], &[T]),
+        care: Option<Care<impl Fn(usize) -> f64>>,
+        law: impl Fn(usize) -> L,
+    ) -> (Measure, f64) {
         let unit = power_of_two(self.unit());
         let largest = u.iter().map(|u| u.value() / unit);
         let plain = match self.norm_q.max(norm(r)).max(unit * norm_of(largest)) {
@@ -231,7 +241,7 @@ impl LawGauge {
         // From units of a power of two to those of q.
         let q = unit / self.unit();
         let relative = (scaled.sqrt() + doubts.sqrt()) * q;
-        Measure {
+        let measure = Measure {
             absolute: relative * self.unit(),
             relative,
             literature: plain_map.sqrt() * (plain_unit / self.unit()),
@@ -244,7 +254,8 @@ impl LawGauge {
             worst_contact,
             worst: worst.sqrt() * q,
             ..Measure::unknown()
-        }
+        };
+        (measure, scaled.sqrt() * q)
     }
 }
 

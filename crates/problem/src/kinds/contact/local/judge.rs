@@ -157,7 +157,7 @@ impl LocalGauge {
         problem: &FrictionLocal<D, L>,
         point: &LocalPoint,
         tolerance: f64,
-    ) -> Option<Measure> {
+    ) -> Option<(Measure, f64)> {
         if problem.rows.is_some() || L::DISKS > 1 {
             return None;
         }
@@ -167,10 +167,12 @@ impl LocalGauge {
         add_blocks_plainly(u, sizes, &problem.W, &point.r);
         let doubt = f64::EPSILON * (*terms + 2) as f64;
         let care = Care { sizes, doubt: |i: usize| doubt * sizes[i] };
-        let mut measure = law.measure::<_, _, D>((&point.r, u), Some(care), |c| problem.law(c));
+        let (mut measure, relative) =
+            law.measure_apart::<_, _, D>((&point.r, u), Some(care), |c| problem.law(c));
+        let merit = Measure { relative, ..measure }.merit();
         let laws = (0..problem.contacts()).map(|c| problem.law(c));
         measure.dual += law.rounding_of_dual(laws, doubt, sizes);
-        measure.passes(tolerance).then_some(measure)
+        measure.passes(tolerance).then_some((measure, merit))
     }
 
     /// The residuals in units of velocity, where rolling friction needs an arm for that.
@@ -225,7 +227,12 @@ impl LocalGauge {
         let nc = problem.contacts();
         let shares = self.rows.values().zip(self.rows.sizes()).zip(&*excuse).enumerate();
         let share = worst(shares.map(|(j, ((sum, &size), excuse))| {
-            let left = bounds.residual(j, point.lambda[j], sum, unit(j).powi(2));
+            let (lambda, w) = (point.lambda[j], unit(j).powi(2));
+            let left = bounds.residual(j, lambda, sum, w);
+            let size = match bounds.is_free(j) {
+                true => size,
+                false => bounds.size_of(j, (lambda, sum), w, size),
+            };
             self.law.loads.excused(nc + j, left, size, *excuse)
         }));
         self.sizes.truncate(point.r.len());

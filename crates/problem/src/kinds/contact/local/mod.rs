@@ -249,7 +249,7 @@ impl<const D: usize, L: Law<D>> Problem for FrictionLocal<D, L> {
         point: &LocalPoint,
         gauge: &mut Self::Gauge,
         tolerance: f64,
-    ) -> Option<Measure> {
+    ) -> Option<(Measure, f64)> {
         gauge.accept(self, point, tolerance)
     }
 

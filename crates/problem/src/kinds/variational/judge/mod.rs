@@ -36,7 +36,8 @@ pub struct SetCounts {
 /// The judge's constants and buffers for a variational inequality.
 ///
 /// `r = x − P_X(x − γ F(x))` vanishes at solutions, for any γ > 0. It is taken with `γ = ξ/φ` and divided by ξ, where ξ is the size of x (the largest modulus in x, in the projection of the start onto X and in
-/// [`Set::size`]; where all are zero, φ and γ = 1; a start that is ten thousand times as large as x, the set and the length that F has near zero, its terms there over their slopes, counts as that length only) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it; at least a ten-thousandth of that at the start). So it does not change
+/// [`Set::size`]; where all are zero, φ and γ = 1; a start or a set that is ten thousand times as large as x, the other one and the length that F has near zero, its terms there over their slopes, counts as large as
+/// these only: a bound of 1e20 is none) and φ that of F (the largest size of a row's terms at x, as the [`McpGauge`](crate::check::McpGauge) has it; at least a ten-thousandth of that at the start). So it does not change
 /// where F, or x with the set, is multiplied by a positive number. Variables and rows of one problem share their unit: a set that mixes variables knows no other.
 ///
 /// | field of [`Measure`] | formula |
@@ -61,11 +62,14 @@ pub struct ViGauge {
     kept: Vec<f64>,
     /// For γ = 1 and for the two others: the points to be projected are far from each other, the active rows too.
     projections: [Vec<Projection>; 3],
-    /// The start as it counts, and the size of it and the set.
+    /// The projection of the start.
     start: Vec<f64>,
-    size: f64,
-    /// Whether it was asked how far off the start is.
-    asked: bool,
+    /// The sizes of it and of the set, and the length that F has near zero.
+    size_of_start: f64,
+    size_of_set: f64,
+    length: Length,
+    /// How they count at the point last looked at.
+    known: Known,
     /// γ of each variable.
     gammas: Vec<f64>,
 }
@@ -84,15 +88,37 @@ pub struct Held {
     pub rows: Vec<Vec<usize>>,
 }
 
+/// The length that F has near zero, where only this tells whether the start or the set is far off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Length {
+    NotAsked,
+    /// Neither F nor its slopes are known there.
+    Unknown,
+    Known(f64),
+}
+
+/// The sizes of start and set as they count at a point.
+#[derive(Debug, Clone, Copy, Default)]
+struct Known {
+    start: f64,
+    set: f64,
+}
+
+impl Known {
+    fn size(self) -> f64 {
+        self.start.max(self.set)
+    }
+}
+
 /// A residual below which each part is looked at by itself.
 const LOOKED_AT: f64 = 1e-3;
 
 /// The part of the size of the start and the set that each part of x has at least.
 const OF_OTHERS: f64 = 1e-4;
-/// A start that is so many times as large as all else is far off.
+/// A start or a set that is so many times as large as all else is far off.
 const FAR_OFF: f64 = 1e4;
-/// How near to zero, in parts of the start, a function without expressions is asked for its length.
-const NEAR: f64 = 1.0 / (1_u64 << 60) as f64;
+/// How near to zero, in parts of the start and powers of two, a function without expressions is asked for its length, as long as that falls.
+const NEAR: [i32; 6] = [60, 120, 240, 480, 720, 1020];
 
 impl ViGauge {
     pub(super) fn new(problem: &Vi) -> Self {
@@ -121,43 +147,69 @@ impl ViGauge {
             kept: zeros(),
             projections: [0, 1, 2]
                 .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
-            size: largest(&start).max(problem.set.size()),
+            size_of_start: largest(&start),
+            size_of_set: problem.set.size(),
             start,
-            asked: false,
+            length: Length::NotAsked,
+            known: Known::default(),
             gammas: zeros(),
         }
     }
 
     /// F at x, and φ. `None` where F is not defined.
     fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
-        if !self.asked && self.size > FAR_OFF * largest(x).max(problem.set.size()) {
-            self.asked = true;
-            self.bring_near(problem);
-        }
+        self.known = self.count(problem, largest(x));
         let Self { terms, units, .. } = self;
         let defined = units.look(&*problem.F, terms, x, precisely);
         defined.then(|| largest(&terms.sizes).max(units.least_of_all()))
     }
 
-    /// A start far beyond the length that F has near zero counts as that length.
-    fn bring_near(&mut self, problem: &Vi) {
-        let Self { terms, start, size, .. } = self;
-        let part = if problem.F.expressions().is_some() { 0.0 } else { NEAR };
-        let near: Vec<f64> = start.iter().map(|s| part * s).collect();
+    /// How start and set count at a point of this size: far beyond all else, F's length near zero included, as large as that.
+    fn count(&mut self, problem: &Vi, size: f64) -> Known {
+        let (start, set) = (self.size_of_start, self.size_of_set);
+        let all = Known { start, set };
+        let is_far = |one: f64, others: f64| one > FAR_OFF * others;
+        if !is_far(start, size.max(set)) && !is_far(set, size.max(start)) {
+            return all;
+        }
+        if self.length == Length::NotAsked {
+            self.length = self.length_of(problem);
+        }
+        let Length::Known(length) = self.length else { return all };
+        let base = size.max(length);
+        if base == 0.0 {
+            return all;
+        }
+        let near = if is_far(set, base) { base } else { base.max(set) };
+        let start = if is_far(start, near) { near } else { start };
+        let near = base.max(start);
+        Known { start, set: if is_far(set, near) { near } else { set } }
+    }
+
+    /// The size of F's terms near zero over their slopes.
+    fn length_of(&mut self, problem: &Vi) -> Length {
+        let Self { terms, start, size_of_start, .. } = self;
         let pattern = problem.F.pattern();
-        if !tentatively(|| terms.look(pattern, &near, false)) || !terms.smooth {
-            return;
+        let at_zero = problem.F.expressions().is_some() || *size_of_start == 0.0;
+        let parts = NEAR.map(|k| 2.0_f64.powi(-k));
+        let parts = if at_zero { &[0.0][..] } else { &parts };
+        let mut found = Length::Unknown;
+        for part in parts {
+            let near: Vec<f64> = start.iter().map(|s| part * s).collect();
+            if !tentatively(|| terms.look(pattern, &near, false)) || !terms.smooth {
+                break;
+            }
+            let length = terms.sizes.iter().enumerate().fold(0.0_f64, |length, (i, d)| {
+                let slope = largest(&terms.jacobian[pattern.range(i)]);
+                if slope > 0.0 { length.max(d / slope) } else { length }
+            });
+            let falls = !matches!(found, Length::Known(before) if length >= 0.5 * before);
+            found = Length::Known(length);
+            if !falls {
+                break;
+            }
         }
-        let length = terms.sizes.iter().enumerate().fold(0.0_f64, |length, (i, d)| {
-            let slope = largest(&terms.jacobian[pattern.range(i)]);
-            if slope > 0.0 { length.max(d / slope) } else { length }
-        });
-        let known = length.max(problem.set.size());
-        if length > 0.0 && *size > FAR_OFF * known {
-            let share = known / *size;
-            start.iter_mut().for_each(|s| *s *= share);
-            *size = known;
-        }
+        found
     }
 
     /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at and the γ of each variable; the projection is left in y, the difference in `moved`.
@@ -190,7 +242,7 @@ impl ViGauge {
     }
 
     /// What F makes of x in the units of its rows that are known beforehand: `max ‖x − P_X(x − γ F)‖_∞ / ξ` over the parts of the set, with `γ = ξ/φ` of each part (of a box, each variable)
-    /// by its own φ, and ξ the size of the part's x, start and set; of parts without a unit nothing.
+    /// by its own φ, and ξ the size of the part's x, start and set, as far as they count; of parts without a unit nothing.
     fn own(&mut self, problem: &Vi, x: &[f64]) -> f64 {
         let mut sizes = vec![0.0; x.len()];
         let (units, terms) = (&self.units, &self.terms);
@@ -199,13 +251,16 @@ impl ViGauge {
             lesser(start, near)
         };
         // What has no size of its own, as a cone that begins at its point, has a part of the others'.
-        let least = if self.size > 0.0 { OF_OTHERS * self.size } else { largest(x) };
+        let known = self.known;
+        let least = if known.size() > 0.0 { OF_OTHERS * known.size() } else { largest(x) };
+        // Of a start far off a part counts.
+        let share = if self.size_of_start > 0.0 { known.start / self.size_of_start } else { 1.0 };
         for (first, set) in problem.set.parts() {
             let whole = first..first + set.dim();
             let Set::Box { lower, upper } = set else {
                 let of = |x: &[f64]| largest(&x[whole.clone()]);
-                let known = of(&self.start).max(set.size());
-                let size = known.max(of(x)).max(least);
+                let stated = (share * of(&self.start)).max(set.size().min(known.set));
+                let size = stated.max(of(x)).max(least);
                 let phi = whole.clone().map(phi).fold(0.0, f64::max);
                 for i in whole {
                     (sizes[i], self.gammas[i]) = scaled(size, phi);
@@ -214,8 +269,9 @@ impl ViGauge {
             };
             for i in whole {
                 let bounds = [lower[i - first], upper[i - first]].into_iter();
-                let known = bounds.filter(|b| b.is_finite()).chain([self.start[i], x[i]]);
-                let size = known.fold(least, |size: f64, x| size.max(x.abs()));
+                let bounds = bounds.filter(|b| b.is_finite()).map(|b| b.abs().min(known.set));
+                let sizes_of = bounds.chain([share * self.start[i].abs(), x[i].abs()]);
+                let size = sizes_of.fold(least, f64::max);
                 (sizes[i], self.gammas[i]) = scaled(size, phi(i));
             }
         }
@@ -228,7 +284,7 @@ impl ViGauge {
 
     /// ξ and γ at a point where the terms of F are φ.
     fn units(&self, x: &[f64], phi: f64) -> (f64, f64) {
-        let size = largest(x).max(self.size);
+        let size = largest(x).max(self.known.size());
         match (size > 0.0, phi > 0.0) {
             (true, true) => (size, size / phi),
             (false, true) => (phi, 1.0),
@@ -304,7 +360,7 @@ impl ViGauge {
         tolerance: f64,
     ) -> Verdict<SetStatus, SetCounts> {
         let measure = self.measure(problem, point, true);
-        let near = tolerance * largest(&point.z).max(self.size);
+        let near = tolerance * largest(&point.z).max(self.known.size());
         let mut statuses = vec![];
         for (first, set) in problem.set.parts() {
             statuses_of(set, &point.z[first..first + set.dim()], near, &mut statuses);
