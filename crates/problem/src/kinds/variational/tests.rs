@@ -204,6 +204,26 @@ fn a_far_bound_makes_no_error_small() {
     }
 }
 
+/// A plane that is far away makes no violation of the others rounding.
+#[test]
+fn a_far_plane_changes_no_projection() {
+    let rows = [(0, 0, -1.0), (1, 1, -1.0), (2, 0, -1.0), (2, 1, -1.0), (3, 0, 1.0), (3, 1, 2.0)];
+    let rows = Csc::from_triplets(4, 2, rows.into_iter()).unwrap();
+    for far in [10.0, 1e8, 1e15, 1e20, 1e300] {
+        let set = Set::inequalities(rows.clone(), vec![1.0, 1.0, 1.5, far]);
+        for (p, y) in [
+            ([-3.0, -2.0], [-1.0, -0.5]),
+            ([-3.0, 1e-3], [-1.0, 1e-3]),
+            ([-1.0 - 1e-9, 0.5], [-1.0, 0.5]),
+            ([0.5, -1.5], [0.5, -1.0]),
+        ] {
+            let found = projected(&set, &p).unwrap();
+            let off = found.iter().zip(&y).map(|(a, b)| (a - b).abs());
+            assert!(off.fold(0.0, f64::max) < 1e-12, "{far:e}, {p:?}: {found:?}");
+        }
+    }
+}
+
 /// From whatever start over a set without a size, of a function that cannot be asked at zero.
 #[test]
 fn no_start_makes_the_errors_of_a_function_small() {

@@ -11,7 +11,7 @@
 use nonsmooth_linalg::budget;
 
 use super::super::Set;
-use super::{distance, largest, norm};
+use super::{distance, norm};
 
 /// Columns that are nearer to others than this are their combinations.
 const DEPENDENT: f64 = 1e-12;
@@ -26,6 +26,9 @@ pub(in super::super) struct Projection {
     /// What was projected last, with b and d, and its projection.
     last: Option<[Vec<f64>; 4]>,
 }
+
+/// A plane is no farther away, in units of what is violated, so that nothing overflows.
+const FARTHEST: f64 = 1e100;
 
 /// Excesses smaller than this, in units of the row's terms, are those of a row on which a point lies.
 const ON: f64 = 1e-7;
@@ -129,12 +132,14 @@ impl Projection {
         let h = |(k, rhs): (usize, f64)| rhs / norms[k] - dot(&rows[k], p);
         let mut h: Vec<f64> = rhs.enumerate().map(h).collect();
         y.copy_from_slice(p);
-        let size = largest(&h);
-        if size == 0.0 || (*equalities == 0 && h.iter().all(|h| *h <= 0.0)) {
+        // The unit is what p violates: beside a plane that is far away all that would be rounding.
+        let violations = h.iter().enumerate().map(|(k, h)| if k < bounds { *h } else { h.abs() });
+        let size = violations.fold(0.0, f64::max);
+        if size == 0.0 {
             passive.clear();
             return true;
         }
-        h.iter_mut().for_each(|h| *h /= size);
+        h.iter_mut().for_each(|h| *h = (*h / size).max(-FARTHEST));
         let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
         let is_on = |&k: &usize| {
             let at = b[k] / norms[k];
