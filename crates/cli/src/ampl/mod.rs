@@ -209,11 +209,12 @@ fn answer(
             Solution { echo: &said.echo, message: &message, x: &said.x, result: said.result };
         solution.write(&path).map_err(|e: IoError| e.to_string())?;
     }
-    // Pyomo shows a user nothing of a message that refuses.
-    if call.ampl && said.result >= result::ERROR {
-        output::print(&format!("{message}\n"));
-    }
-    if !call.ampl && options.wantsol & 8 == 0 {
+    let shown = match call.ampl {
+        // Pyomo shows a user nothing of a message that refuses.
+        true => said.result >= result::ERROR,
+        false => options.wantsol & 8 == 0,
+    };
+    if shown {
         output::print(&format!("{message}\n"));
     }
     if !call.ampl && options.wantsol & 2 != 0 {

@@ -210,8 +210,8 @@ fn sparse(t: &mut Tokens, symmetry: Symmetry) -> Result<Csc, IoError> {
         return Err(t.wrong("the shape", "a matrix that the entries can fill", Some(&found)));
     }
     let mut entries = Vec::with_capacity(2 * count);
-    // Whether entries stand above and below the diagonal.
-    let mut triangles = [0; 2];
+    // Whether entries stand above the diagonal, and below it.
+    let (mut above, mut below) = (false, false);
     for k in 0..count {
         let what = format!("entry {k}");
         let index = |t: &mut Tokens, size: usize| {
@@ -220,15 +220,17 @@ fn sparse(t: &mut Tokens, symmetry: Symmetry) -> Result<Csc, IoError> {
         };
         let (i, j) = (index(t, rows)?, index(t, columns)?);
         let x = t.real(|| format!("entry {k}"))?;
-        let one = [i < j, i > j].map(|there| there as usize);
-        triangles = [triangles[0] | one[0], triangles[1] | one[1]];
-        if symmetry != Symmetry::General && triangles == [1, 1] {
-            let found = format!("({}, {})", i + 1, j + 1);
-            let expected = "entries of one triangle, as the other follows from it";
-            return Err(t.wrong(&what, expected, Some(&found)));
-        }
-        if symmetry == Symmetry::Skew && i == j && x != 0.0 {
-            let expected = "no diagonal, as the matrix is skew-symmetric";
+        (above, below) = (above || i < j, below || i > j);
+        let refused = match symmetry {
+            Symmetry::Symmetric | Symmetry::Skew if above && below => {
+                Some("entries of one triangle, as the other follows from it")
+            }
+            Symmetry::Skew if i == j && x != 0.0 => {
+                Some("no diagonal, as the matrix is skew-symmetric")
+            }
+            _ => None,
+        };
+        if let Some(expected) = refused {
             return Err(t.wrong(&what, expected, Some(&format!("({}, {})", i + 1, j + 1))));
         }
         entries.push((i, j, x));

@@ -98,11 +98,10 @@ impl Clip {
         let best = best_a.max(best_b);
         let (reference, incident, face) = if by_a { (a, b, face_a) } else { (b, a, face_b) };
         let other = incident.1.facing(reference.1.normals[face]);
+        let (n, m) = (reference.1.normals[face], incident.1.normals[other]);
+        let tilt = norm(cross(n, m));
         // Where two faces are parallel no edges can be better by more than rounding.
-        let parallel = {
-            let (n, m) = (reference.1.normals[face], incident.1.normals[other]);
-            norm(cross(n, m)) * (a.0.size + b.0.size) < 0.1 * HYSTERESIS * size
-        };
+        let parallel = tilt * (a.0.size + b.0.size) < 0.1 * HYSTERESIS * size;
         let mut axis = if by_a { Axis::FaceA(face as u32) } else { Axis::FaceB(face as u32) };
         if !parallel {
             let margin = if matches!(last, Some(Axis::FaceA(_) | Axis::FaceB(_))) {
@@ -120,8 +119,7 @@ impl Clip {
                     axis = Axis::Edges(edges.i, edges.j);
                     self.cross(a, b, &edges, prediction, &mut found);
                     // Of faces that nearly lie on each other one point would be left, about which they rock while all else sinks.
-                    let (n, m) = (reference.1.normals[face], incident.1.normals[other]);
-                    let facing = norm(cross(n, m)) < FACING && dot(n, m) < 0.0;
+                    let facing = tilt < FACING && dot(n, m) < 0.0;
                     if facing && dot(edges.normal, n).abs() > 1.0 - FACING {
                         let crossing = [Feature::Edge(edges.i), Feature::Edge(edges.j)];
                         self.faces(
