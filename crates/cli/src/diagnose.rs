@@ -21,7 +21,7 @@ pub struct Args {
     #[arg(required = true, value_name = "FILE", help = files::help("Files with one problem each", |_| true))]
     files: Vec<PathBuf>,
     /// The most rows of W (or of M) for which rank and condition number are computed
-    #[arg(long, value_name = "ROWS", default_value = "1500", value_parser = files::whole)]
+    #[arg(long, value_name = "ROWS", default_value = "1500", value_parser = files::whole, allow_hyphen_values = true)]
     spectrum_limit: usize,
     /// At most this many seconds for each file, half of them for rank and condition number
     #[arg(long, value_name = "SECONDS", default_value = "20", allow_hyphen_values = true)]

@@ -50,7 +50,7 @@ pub struct Args {
     #[arg(long, value_name = "SIZE", value_parser = files::size)]
     memory_limit: Option<u64>,
     /// Factorise large matrices and sweep over large piles on so many threads, 0 for one a core; the results are the same, bit for bit
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, allow_hyphen_values = true)]
     threads: usize,
     /// Start from the file's /guesses/1 (complementarity: its [solution]) in place of zero; with =FILE from the
     /// solution of another file (or its /guesses/1) of the same size, with =DIRECTORY from the file of the same name there

@@ -59,7 +59,9 @@ fn head(kind: &str) -> String {
     )
 }
 
+/// An attribute as XML takes it: no control character has a place there, however written.
 fn escape(text: &str) -> String {
+    let text = text.replace(char::is_control, "\u{fffd}");
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }
 

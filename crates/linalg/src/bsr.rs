@@ -35,7 +35,7 @@ impl<const D: usize> Rows<D> {
 impl<const D: usize> Bsr<D> {
     /// Gathers a general sparse matrix into blocks; blocks without a stored entry are absent.
     ///
-    /// The rows and columns of `a` must be multiples of D (the problem's validation says so by name).
+    /// Panics unless the rows and columns of `a` are multiples of D: who has a caller's matrix asks before.
     pub fn from_csc(a: &Csc) -> Self {
         assert!(a.nrows().is_multiple_of(D) && a.ncols().is_multiple_of(D));
         let (nr, nc) = (a.nrows() / D, a.ncols() / D);
@@ -77,11 +77,10 @@ impl<const D: usize> Bsr<D> {
         Self { of: Arc::new(Rows { ncols: nc, row_ptr, col_idx, blocks }) }
     }
 
-    /// Assembles a matrix from block rows.
+    /// Assembles a matrix from block rows, columns ascending below `ncols` in each: a problem checks that those of its W do.
     pub fn from_rows(ncols: usize, rows: &[BlockRow<D>]) -> Self {
         let mut out = Rows::empty(ncols);
         for row in rows {
-            debug_assert!(row.windows(2).all(|w| w[0].0 < w[1].0));
             out.col_idx.extend(row.iter().map(|e| e.0));
             out.blocks.extend(row.iter().map(|e| e.1));
             out.row_ptr.push(out.blocks.len());

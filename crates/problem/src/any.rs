@@ -214,6 +214,10 @@ impl Problem for AnyProblem {
         with_problem!(self, p => p.origin().into())
     }
 
+    fn validate(&self) -> Result<(), ProblemError> {
+        with_problem!(self, p => Problem::validate(p))
+    }
+
     fn validate_point(&self, any: &AnyPoint) -> Result<(), ProblemError> {
         with_problem!(self, p => validated(p, any))
     }

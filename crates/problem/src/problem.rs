@@ -32,6 +32,9 @@ pub trait Problem {
     /// The point with all parts zero, of the lengths that the problem asks for.
     fn origin(&self) -> Self::Point;
 
+    /// Checks shapes and values, of fields that a caller may have changed. Cost: one pass over the data.
+    fn validate(&self) -> Result<(), ProblemError>;
+
     /// A caller's point, checked: every part has the right length and holds finite numbers.
     fn validate_point(&self, point: &Self::Point) -> Result<(), ProblemError>;
 

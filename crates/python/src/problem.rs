@@ -5,8 +5,8 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use nonsmooth_io::{ProblemFile, StoredPoint};
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, Complementarity, Kind, Mcp, OfAny, Problem as _, Shape, Stated, Vi,
-    each_kind, with_complementarity,
+    AnyPoint, AnyProblem, Complementarity, Kind, Mcp, OfAny, OfAnyPoint, Problem as _,
+    ProblemError, Shape, Stated, Vi, each_kind, with_complementarity, with_friction,
 };
 use nonsmooth_solve::{Kept, Limits};
 use pyo3::prelude::*;
@@ -246,7 +246,7 @@ impl Problem {
         use nonsmooth_problem::check::Judged;
         let mut file = (*self.file()).clone();
         if let Some(given) = answer {
-            let point = self::point(&file.problem, "answer", given)?;
+            let point = whole_point(&file.problem, "answer", given)?;
             file.problem.validate_point(&point).map_err(mistake)?;
             let verdict = match given.cast::<crate::solve::Answer>() {
                 Ok(answer) => answer.get().answer.verdict.clone(),
@@ -362,11 +362,34 @@ impl Problem {
     ) -> PyResult<Bound<'py, PyAny>> {
         use nonsmooth_problem::check::Judged;
         let file = self.file();
-        let point = self::point(&file.problem, "point", point)?;
+        let point = whole_point(&file.problem, "point", point)?;
         Limits { tolerance, ..Limits::default() }.validate().map_err(mistake)?;
         let verdict = py.detach(|| file.problem.judge(&point, tolerance)).map_err(mistake)?;
         Ok(pythonize::pythonize(py, &verdict)?)
     }
+}
+
+/// As [`point`]; velocities that are not given follow from the impulses.
+fn whole_point(problem: &AnyProblem, place: &str, given: &Bound<'_, PyAny>) -> PyResult<AnyPoint> {
+    fn follow<P: nonsmooth_problem::Problem<Point: OfAnyPoint>>(
+        problem: &P,
+        point: &mut AnyPoint,
+    ) -> Result<(), ProblemError> {
+        if let Some(point) = P::Point::of_mut(point) {
+            problem.validate_point(point)?;
+            let mut gauge = problem.gauge()?;
+            problem.measure(point, &mut gauge);
+            problem.follow_impulses(point, &mut gauge);
+        }
+        Ok(())
+    }
+    let mut point = self::point(problem, place, given)?;
+    let whole = given.cast::<crate::solve::Answer>().is_ok()
+        || given.cast::<PyDict>().is_ok_and(|parts| parts.contains("v").unwrap_or(false));
+    if let (AnyProblem::Friction(contacts), false) = (problem, whole) {
+        with_friction!(contacts, p => follow(p, &mut point)).map_err(mistake)?;
+    }
+    Ok(point)
 }
 
 /// A point of the problem: of an answer, of its parts by their names, or of the array that it is made of: z or x, of contacts the impulses r.

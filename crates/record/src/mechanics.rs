@@ -20,6 +20,8 @@ use serde_json::{Value, json};
 
 /// Gravity of Siconos' runs, m/s².
 const GRAVITY: f64 = 9.80665;
+/// Entries of a tensor of inertia across the diagonal from each other differ by no more than this part of it.
+const SYMMETRIC: f64 = 1e-9;
 /// Their step and end where the file has no history, s.
 const TIMES: [f64; 2] = [5e-4, 10.0];
 
@@ -229,8 +231,18 @@ impl<'a> Import<'a> {
             Some(mass) => {
                 let inertia = match object.inertia.as_deref() {
                     Some(&[x, y, z]) => vec![x, y, z],
-                    // By rows; the entry below the diagonal is that above.
-                    Some(&[xx, xy, xz, _, yy, yz, _, _, zz]) => vec![xx, yy, zz, xy, xz, yz],
+                    // By rows.
+                    Some(&[xx, xy, xz, yx, yy, yz, zx, zy, zz]) => {
+                        let size = xx.abs().max(yy.abs()).max(zz.abs());
+                        let apart = [xy - yx, xz - zx, yz - zy].into_iter().map(f64::abs);
+                        let apart = apart.fold(0.0, f64::max);
+                        if apart > SYMMETRIC * size {
+                            return Err(format!(
+                                "{place}: expected a symmetric `inertia`, found entries that differ by {apart} from those across the diagonal"
+                            ));
+                        }
+                        vec![xx, yy, zz, xy, xz, yz]
+                    }
                     Some(other) => {
                         let found = format!("{} numbers", other.len());
                         return Err(format!("{place}: expected 3 or 9 numbers as `inertia`, found {found}"));

@@ -273,6 +273,7 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
         watch: &mut dyn FnMut(&Progress),
     ) -> Result<Answer<P>, SolveError> {
         let begun = Instant::now();
+        self.validate()?;
         // Nobody knows how long a caller's functions take: whoever asks them here does so within the limits, the judge as well.
         let scope = self.asks_functions().then(|| how.limits.budget(begun).enter());
         let mut session = kept.take::<P>(how)?;

@@ -4,10 +4,13 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use nonsmooth_linalg::{Bsr, Dense};
 use nonsmooth_problem::check::Measure;
 use nonsmooth_problem::field::{Differences, Pattern};
 use nonsmooth_problem::planted::{Planted, PlantedLcp, PlantedMlcp};
-use nonsmooth_problem::{AnyProblem, FrictionGlobal, GlobalPoint, Mcp, OfAny, Problem};
+use nonsmooth_problem::{
+    AnyProblem, FrictionGlobal, FrictionLocal, GlobalPoint, Lcp, Mcp, OfAny, Problem,
+};
 use nonsmooth_solve::contact::splitting::Nsgs;
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::SettingsMap;
@@ -78,6 +81,44 @@ fn a_limit_leaves_an_answer_with_a_verdict() {
         assert!(!answer.verdict.solved);
         assert_eq!(answer.verdict.velocity.len(), problem.w.len());
     }
+}
+
+#[test]
+fn a_solution_to_start_from_needs_no_time() {
+    let limits = Limits { time_limit: Some(0.0), ..Limits::default() };
+    let matrix = Dense::from_rows(&[[2.0, 1.0], [1.0, 2.0]]).unwrap();
+    let lcp = Lcp::new(matrix, vec![-5.0, -7.0]).unwrap();
+    for name in registry::solver_names::<Lcp>() {
+        let mut session = registry::session(&name, &SettingsMap::new()).unwrap();
+        let mut point = lcp.origin();
+        point.z.copy_from_slice(&[1.0, 3.0]);
+        match session.solve(&lcp, &mut point, &limits, &mut |_| ()) {
+            Ok(outcome) => assert_eq!(outcome.status, Status::Solved, "{name}"),
+            Err(e) => assert!(e.is_inapplicable(), "{name}: {e}"),
+        }
+        assert_eq!(point.z, [1.0, 3.0], "{name}");
+    }
+}
+
+/// Fields are public: what was changed to data that are none is an error, no panic and no proof.
+#[test]
+fn changed_fields_are_checked() {
+    let (mut problem, _) = Planted { contacts: 2, dofs: 6, ..Planted::default() }.local::<3>();
+    let said = |p: &FrictionLocal<3>| solve(p).unwrap_err().to_string();
+    let q = std::mem::take(&mut problem.q);
+    assert!(said(&problem).starts_with("q: expected 6"), "{}", said(&problem));
+    problem.q = q;
+    problem.mu[0] = -0.5;
+    assert!(said(&problem).starts_with("mu[0]"), "{}", said(&problem));
+    let block = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for row in [vec![(3, block)], vec![(1, block), (0, block)], vec![(0, block), (0, block)]] {
+        let w = Bsr::from_rows(2, &[row, vec![(1, block)]]);
+        let error = FrictionLocal::<3>::new(w, vec![1.0; 6], vec![0.5; 2]).unwrap_err();
+        assert!(error.to_string().starts_with("W, block row 0"), "{error}");
+    }
+    let (mut lcp, _) = PlantedLcp::default().lcp();
+    lcp.q.pop();
+    assert!(solve(&lcp).unwrap_err().to_string().starts_with("q: expected"));
 }
 
 /// Who is given up in the middle of a preparation has the start, judged: W of a large problem, or its other form, may take all the time there is.

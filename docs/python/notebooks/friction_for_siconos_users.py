@@ -52,7 +52,7 @@ auto.plot()
 
 # %%
 contacts = auto.contacts
-print({status: int((contacts["status"] == status).sum()) for status in ("open", "stick", "slip")})
+print({status: int((contacts["status"] == status).sum()) for status in ("open", "stick", "stick at limit", "slip")})
 contacts[:3]
 
 # %% [markdown]

@@ -17,7 +17,7 @@ use nonsmooth_problem::{AnyPoint, AnyProblem};
 use nonsmooth_solve::{Limit, Status};
 
 use crate::solve::{Plan, Solved, limits, solve};
-use crate::{Exit, output};
+use crate::{Exit, files, output};
 use options::{KEYS, Options, pairs_in, pairs_of};
 
 /// Numbers of results, after the driver of the solver PATH.
@@ -146,6 +146,9 @@ fn answer(
     let base = stub.strip_suffix(".nl").unwrap_or(stub);
     let with = |extension: &str| PathBuf::from(format!("{base}.{extension}"));
     let file = if with("nl").exists() { with("nl") } else { stub.into() };
+    let solution = call.solution.clone().unwrap_or(with("sol"));
+    let read = [Some(file.as_path()), call.bounds.as_deref()];
+    files::apart(read.into_iter().flatten(), [("-o", solution.as_path())])?;
     let mut pairs = vec![];
     let mut mistake = None;
     for variable in variables(name) {
@@ -204,10 +207,9 @@ fn answer(
         message += &format!("\n{remark}");
     }
     if call.ampl || call.writes || options.wantsol & 1 != 0 {
-        let path = call.solution.clone().unwrap_or(with("sol"));
-        let solution =
+        let written =
             Solution { echo: &said.echo, message: &message, x: &said.x, result: said.result };
-        solution.write(&path).map_err(|e: IoError| e.to_string())?;
+        written.write(&solution).map_err(|e: IoError| e.to_string())?;
     }
     let shown = match call.ampl {
         // Pyomo shows a user nothing of a message that refuses.

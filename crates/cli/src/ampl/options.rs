@@ -156,7 +156,7 @@ pub(super) fn pairs_of(text: &str) -> Result<Vec<(String, String)>, String> {
 pub(super) fn pairs_in(arguments: &[String]) -> Result<Vec<(String, String)>, String> {
     let words = arguments.iter().flat_map(|word| match word.split_once('=') {
         Some((key, value)) => {
-            let parts = [key, "=", value].map(str::to_owned);
+            let parts = [key.trim(), "=", value.trim()].map(str::to_owned);
             parts.into_iter().filter(|part| !part.is_empty()).collect()
         }
         None => vec![word.clone()],

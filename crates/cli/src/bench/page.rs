@@ -26,7 +26,7 @@ pub struct Args {
     #[arg(long, value_name = "FOLDER")]
     problems: Vec<PathBuf>,
     /// No spectrum of problems whose matrix has more rows
-    #[arg(long, value_name = "M", default_value = "1000", value_parser = files::whole)]
+    #[arg(long, value_name = "M", default_value = "1000", value_parser = files::whole, allow_hyphen_values = true)]
     spectrum_limit: usize,
     /// The command that makes the page again, to be named on it
     #[arg(long, value_name = "TEXT", default_value = "nonsmooth bench page")]

@@ -46,7 +46,7 @@ pub struct Args {
     #[arg(long, value_name = "SIZE", value_parser = size)]
     memory_limit: Option<u64>,
     /// Timed solves of a run, after one to warm up (more where they are very short); with 0 the first solve counts
-    #[arg(long, value_name = "K", default_value_t = 3)]
+    #[arg(long, value_name = "K", default_value_t = 3, allow_hyphen_values = true)]
     repeats: u32,
     /// A solve that takes longer is not repeated: the first one counts
     #[arg(long, value_name = "S", default_value = "1", allow_hyphen_values = true)]

@@ -19,7 +19,7 @@ pub struct Args {
     problems: Vec<PathBuf>,
     /// No spectrum (rank ratio, condition, asymmetry) of problems whose matrix has more rows: it is dense, and its cost
     /// grows with the third power
-    #[arg(long, value_name = "M", default_value = "1000", value_parser = files::whole)]
+    #[arg(long, value_name = "M", default_value = "1000", value_parser = files::whole, allow_hyphen_values = true)]
     spectrum_limit: usize,
     /// Print a table of Markdown
     #[arg(long, conflicts_with = "csv")]

@@ -37,7 +37,7 @@ pub struct Args {
     #[arg(long)]
     spectrum: bool,
     /// The most rows for which the spectrum is computed
-    #[arg(long, value_name = "ROWS", default_value = "2000", value_parser = files::whole, requires = "spectrum")]
+    #[arg(long, value_name = "ROWS", default_value = "2000", value_parser = files::whole, requires = "spectrum", allow_hyphen_values = true)]
     spectrum_limit: usize,
     /// Contact: decide whether a solution exists, as `nonsmooth exists` does. Without this, a short search
     /// proves it for most problems of up to 2000 contacts

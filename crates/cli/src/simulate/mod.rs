@@ -37,7 +37,7 @@ pub struct Args {
     /// The time at the end, s [default: the scene's time.end; 1 for a family]
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     end: Option<f64>,
-    /// Steps between two frames of the files written [default: the scene's output.every]
+    /// Steps between two frames of the files written; pages and pictures show the last state too [default: the scene's output.every]
     #[arg(long, value_name = "STEPS", allow_hyphen_values = true)]
     every: Option<u64>,
     /// Write the trajectory (HDF5), while the run goes on into parts beside it: what is written stays readable whatever happens
@@ -255,6 +255,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             ("--svg", &args.svg),
         ],
     )?;
+    if args.dump_every == Some(0) {
+        return Err("--dump-every: expected at least one step, found 0".into());
+    }
     if let Some(folder) = &args.dump_fclib {
         files::folder("--dump-fclib", folder)?;
     }
@@ -314,6 +317,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if let Some(out) = &out {
         note(out, mistake.map_or_else(|| recorder.finish(&simulation), Err));
     }
+    recorder.show_the_end(&simulation);
     if let Some(csv) = &csv {
         note(csv, files::write_text("--csv", csv, &recorder.csv()));
     }

@@ -79,6 +79,14 @@ impl Recorder {
         }
     }
 
+    /// Ends what is shown with the state at the end, if that is no frame already.
+    pub fn show_the_end(&mut self, simulation: &Simulation) {
+        let last = self.trajectory.frames.last().map(|frame| frame.step);
+        if last != Some(simulation.state().steps) {
+            self.frame(simulation);
+        }
+    }
+
     fn frame(&mut self, simulation: &Simulation) {
         if self.frames {
             self.trajectory.frames.push(nonsmooth_record::frame(simulation));

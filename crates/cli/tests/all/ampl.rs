@@ -205,6 +205,11 @@ fn questions_are_answered_and_mistakes_are_one_line() {
     place.run(&[]).refused(&["expected a stub", "usage: nonsmooth-ampl"]);
     place.run(&["-x", "m"]).refused(&["found `-x`"]);
     place.run(&["none", "-AMPL"]).refused(&["none"]);
+    // No answer over what is read.
+    place.run(&["-om.nl", "m", "-AMPL"]).refused(&["-o m.nl", "a file of its own"]);
+    assert_eq!(std::fs::read_to_string(place.0.path("m.nl")).unwrap(), MODEL);
+    let trimmed = place.run(&["m", "-AMPL", "tol = 1e-9"]).exits(0).stdout;
+    assert!(!trimmed.contains("unknown key"), "{trimmed}");
     std::fs::write(place.0.path("bad.nl"), MODEL.replacen("n1", "o99", 1)).unwrap();
     place.run(&["bad", "-AMPL"]).refused(&["bad.nl: line 14, segment C1", "found `o99`"]);
     assert!(!place.0.path("bad.sol").exists());

@@ -11,6 +11,8 @@ pub(super) struct Header {
     pub(super) echo: Echo,
     pub(super) objectives: usize,
     pub(super) defined: usize,
+    /// Of the Jacobian, zeros that stand for nonlinear terms included.
+    pub(super) entries: usize,
 }
 
 /// What a solution repeats of the file that it answers.
@@ -95,7 +97,7 @@ pub(super) fn header(input: &mut Input) -> Result<Header, IoError> {
         let found = format!("{n} of them");
         return Err(input.wrong(LINES[6], "no binary or integer variables", found));
     }
-    line(input, 7)?;
+    let entries = line(input, 7)?[0];
     line(input, 8)?;
     let parts = line(input, 9)?;
     let defined = parts.iter().fold(0usize, |sum, &n| sum.saturating_add(n));
@@ -105,7 +107,7 @@ pub(super) fn header(input: &mut Input) -> Result<Header, IoError> {
     }
     input.form = form;
     let echo = Echo { form, options, tolerance, variables, rows };
-    Ok(Header { title: title.filter(|t| !t.is_empty()), echo, objectives, defined })
+    Ok(Header { title: title.filter(|t| !t.is_empty()), echo, objectives, defined, entries })
 }
 
 /// The options of the first line, which begin after its letter.

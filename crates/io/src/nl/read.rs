@@ -278,6 +278,11 @@ impl Reader<'_> {
         };
         let conditions = self.conditions.ok_or_else(|| missing("r", "rows"))?;
         let bounds = self.bounds.ok_or_else(|| missing("b", "variables"))?;
+        let entries = linear.iter().flatten().map(Vec::len).sum::<usize>();
+        if entries < header.entries {
+            let expected = format!("{} entries, as the header says", header.entries);
+            return Err(input.wrong("the segments J", &expected, entries));
+        }
         let rows = expressions.into_iter().zip(linear).map(|(expression, terms)| {
             let expression = expression.unwrap_or_else(|| builder.graph.constant(0.0));
             // Zeros say where the nonlinear part has variables, which is known from itself.

@@ -11,7 +11,9 @@ pub(crate) mod rows;
 mod verdict;
 
 pub use crate::kinds::complementarity::{HlcpGauge, LinearGauge, McpGauge, RowCounts, RowStatus};
-pub use crate::kinds::contact::{ContactStatus, GlobalGauge, Impulses, Law, LocalGauge, Motion};
+pub use crate::kinds::contact::{
+    ContactStatus, GlobalGauge, Impulses, Law, LocalGauge, Motion, friction_rows,
+};
 pub use crate::kinds::variational::{Held, SetCounts, SetStatus, ViGauge};
 pub use certificate::Certificate;
 pub use existence::{Existence, Kinematic, Kinematics};

@@ -59,6 +59,19 @@ pub fn is_tentative() -> bool {
     TENTATIVE.get()
 }
 
+/// Checks that the pattern of the Jacobian is one of as many rows as F has.
+pub(crate) fn fits(field: &dyn Field) -> Result<(), ProblemError> {
+    let (pattern, n) = (field.pattern(), field.dim());
+    if pattern.rows() != n {
+        return Err(ProblemError::shape(
+            "pattern",
+            format!("{n} rows, as F"),
+            pattern.rows().to_string(),
+        ));
+    }
+    pattern.validate()
+}
+
 /// The places where a Jacobian may not be zero: columns of each row, ascending.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Pattern {

@@ -264,6 +264,8 @@ fn path(points: impl Iterator<Item = Point>) -> String {
     out + "Z"
 }
 
+/// Text as XML takes it: no control character has a place there, however written.
 pub(super) fn escape(text: &str) -> String {
+    let text = text.replace(char::is_control, "\u{fffd}");
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -3,7 +3,7 @@
 use nonsmooth_linalg::{Csc, Dense, MatrixError};
 
 use super::{Constant, Lagrangian, RowLaw, Size};
-use crate::Law;
+use crate::{Law, SimulateError};
 
 /// `M v' + C v + K q = load`, with contacts and limits whose gaps are linear in q: elastic bodies after discretisation, trains of masses and springs.
 ///
@@ -64,6 +64,15 @@ impl<const D: usize> LinearSystem<D> {
     /// Errors: fewer masses than one, another number of springs than one less.
     pub fn chain(masses: &[f64], springs: &[f64]) -> Result<Self, MatrixError> {
         let n = masses.len();
+        if n == 0 {
+            let (place, expected, found) = ("masses".into(), "at least one".into(), "none".into());
+            return Err(MatrixError::Shape { place, expected, found });
+        }
+        if springs.len() + 1 != n {
+            let expected = format!("{}, one fewer than masses", n - 1);
+            let found = springs.len().to_string();
+            return Err(MatrixError::Shape { place: "springs".into(), expected, found });
+        }
         let entries = springs
             .iter()
             .enumerate()
@@ -91,6 +100,27 @@ impl<const D: usize> LinearSystem<D> {
 impl<const D: usize> Lagrangian<D> for LinearSystem<D> {
     fn size(&self) -> Size {
         Size::new(self.load.len()).contacts(self.contacts.len()).rows(self.limits.len())
+    }
+
+    /// Weights of contacts and limits are of degrees of freedom, and finite.
+    fn validate(&self) -> Result<(), SimulateError> {
+        let n = self.load.len();
+        let contacts = self.contacts.iter().enumerate();
+        let contacts = contacts.flat_map(|(k, c)| {
+            c.directions.iter().map(move |weights| (format!("contacts[{k}].directions"), weights))
+        });
+        let limits = self.limits.iter().enumerate();
+        let limits = limits.map(|(k, (row, _))| (format!("limits[{k}].weights"), &row.weights));
+        for (key, weights) in contacts.chain(limits) {
+            if let Some((i, _)) = weights.iter().find(|(i, _)| *i >= n) {
+                let expected = format!("degrees of freedom below {n}");
+                return Err(SimulateError::value(key, expected, i));
+            }
+            if let Some((_, w)) = weights.iter().find(|(_, w)| !w.is_finite()) {
+                return Err(SimulateError::value(key, "finite weights", w));
+            }
+        }
+        Ok(())
     }
 
     fn mass(&self, _q: &[f64], mass: &mut Dense) {

@@ -24,7 +24,7 @@ pub use state::{LagrangianContact, LagrangianState};
 
 use nonsmooth_linalg::{Csc, Dense};
 
-use crate::Law;
+use crate::{Law, SimulateError};
 
 /// How many of what a [`Lagrangian`] has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -117,6 +117,11 @@ pub struct Constant<'a> {
 pub trait Lagrangian<const D: usize> {
     /// How many of what there are; it never changes.
     fn size(&self) -> Size;
+
+    /// Checks the data of the system, once before it moves.
+    fn validate(&self) -> Result<(), SimulateError> {
+        Ok(())
+    }
 
     /// M(q), n × n, symmetric positive definite.
     fn mass(&self, q: &[f64], mass: &mut Dense);

@@ -82,6 +82,7 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
     {
         const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
         scheme.validate()?;
+        system.validate()?;
         let n = system.size().dofs;
         for (name, x) in [("q", q), ("v", v)] {
             if x.len() != n {

@@ -362,6 +362,29 @@ fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
             "<key> (line 2): expected 7 numbers as `qpos`, found 2",
         ),
     ];
+    let two = |inner: &str| {
+        format!(
+            "<mujoco><worldbody>\n<body name='a'><freejoint/><geom name='g' size='1'/>\n<body name='c' pos='2 0 0'>{inner}</body></body>\n<body name='b'><freejoint/><geom name='h' size='1'/></body></worldbody>\n"
+        )
+    };
+    let excluded = "<contact><exclude body1='c' body2='b'/></contact></mujoco>";
+    let paired = "<contact><pair geom1='g' geom2='h'/></contact></mujoco>";
+    let solid = "<geom name='s' size='.5'/>";
+    let cases = cases.into_iter().chain([
+        (
+            two("<geom name='s' size='.5' contype='0' conaffinity='0'/>")
+                + &paired.replace("'g'", "'s'"),
+            "<pair> (line 5): expected a geom that touches by its bits as `geom1`",
+        ),
+        (
+            two("<geom size='.5'/>").replace("name='c'", "name='c' gravcomp='1'") + "</mujoco>",
+            "<body> `a` (line 2): expected one `gravcomp` of all that moves as one body",
+        ),
+        (
+            two("<geom name='s' size='.5' mass='-1'/>") + "</mujoco>",
+            "<geom> `s` (line 3): expected a mass of at least 0, found -1",
+        ),
+    ]);
     for (text, begins) in cases {
         let error = mjcf(&text, Path::new("")).unwrap_err().to_string();
         assert!(error.starts_with(begins) && !error.contains('\n'), "{error}\n{begins}");
@@ -372,6 +395,18 @@ fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
         "</body>".repeat(300)
     );
     assert!(mjcf(&deep, Path::new("")).is_err());
+    // A body that excludes as a whole, and a pair that touches without saying so, are neither.
+    let made = import(&(two("<site/>") + &excluded.replace("'c'", "'a'")));
+    assert!(!said(&made, "exclude"), "{:?}", made.warnings);
+    let made = import(&(two(solid) + excluded));
+    assert!(
+        said(&made, "<exclude> (line 5): of `c` all that moves with it is excluded, too"),
+        "{:?}",
+        made.warnings
+    );
+    let made = import(&(two("<geom size='.5' contype='2'/>") + paired));
+    assert!(said(&made, "<pair> (line 5): left out"), "{:?}", made.warnings);
+    assert!(said(&made, "(line 3): other bits than those of other geoms"), "{:?}", made.warnings);
     let made = import(
         &body("<geom size='1' fluidshape='none' odd='1'/>")
             .replace("<freejoint/>", "<joint type='ball' damping='2'/>"),

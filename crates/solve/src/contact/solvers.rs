@@ -4,7 +4,7 @@ use nonsmooth_problem::check::Kinematic;
 
 use crate::contact::auto::Auto;
 use crate::contact::form::{
-    Concurrent, Disked, Explicit, Frictional, Holding, Linear, Linearised, OnContacts, Regularised,
+    Concurrent, Disked, Explicit, Frictional, Linear, Linearised, OnContacts, Parted, Regularised,
 };
 use crate::contact::interior::{ConvexRelaxation, Interior};
 use crate::contact::law::Rolling;
@@ -50,7 +50,7 @@ where
         + Linearised<D>
         + Explicit<D>
         + Kinematic<D>
-        + Holding<D>
+        + Parted<D>
         + Send
         + 'static,
 {
@@ -88,7 +88,7 @@ where
         + Disked<5, Law = Rolling>
         + Linearised<5>
         + Kinematic<5>
-        + Holding<5>
+        + Parted<5>
         + Send
         + 'static,
     Weigh: Reformulation<P, To = P>,

@@ -92,6 +92,10 @@ impl Problem for Rolled {
         self.data.origin()
     }
 
+    fn validate(&self) -> Result<(), ProblemError> {
+        self.data.validate()
+    }
+
     fn validate_point(&self, point: &LocalPoint) -> Result<(), ProblemError> {
         self.data.validate_point(point)
     }

@@ -1,9 +1,11 @@
 //! The registry: what it refuses, and that methods that share nothing agree.
 
+use nonsmooth_linalg::Csc;
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Problem};
 use nonsmooth_solve::registry::{abouts, session};
 use nonsmooth_solve::settings::{SettingsMap, from_texts};
+use nonsmooth_solve::{Limits, Status};
 
 fn refusal(texts: &[&str]) -> String {
     let map = from_texts(texts).unwrap();
@@ -85,5 +87,25 @@ fn independent_methods_agree() {
         let u = motion(name, &texts);
         let far = u.iter().zip(&reference).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
         assert!(far < 1e-8 * size, "{name} {texts:?}: {far:e}");
+    }
+}
+
+/// The rounding of a start that is far too large stays in the velocities that sweeps of a global problem carry along: a sweep that moves nothing is no end before they are renewed.
+#[test]
+fn a_start_that_is_far_too_large_is_no_end() {
+    let identity = || Csc::diagonal(&[1.0; 3]);
+    let (f, w, mu) = (vec![-1.0, 0.3, 0.0], vec![0.0; 3], vec![0.5]);
+    let problem = FrictionGlobal::<3>::new(identity(), identity(), f, w, mu).unwrap();
+    for name in ["nsgs", "nsgs_colored", "psor"] {
+        for size in (0..=20).map(|e| 10.0_f64.powi(e)) {
+            for tolerance in [1e-8, 1e-12] {
+                let mut session = session(name, &SettingsMap::new()).unwrap();
+                let mut point = problem.origin();
+                point.r.copy_from_slice(&[size, -0.7 * size, -0.7 * size]);
+                let limits = Limits { tolerance, ..Limits::default() };
+                let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+                assert_eq!(outcome.status, Status::Solved, "{name} from {size:e} to {tolerance:e}");
+            }
+        }
     }
 }

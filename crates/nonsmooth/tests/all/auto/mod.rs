@@ -437,6 +437,64 @@ fn a_problem_without_a_solution_is_refuted() {
     }
 }
 
+/// Problems as one, in which contacts and velocities of each stand between those of the others.
+fn among_each_other(parts: &[FrictionGlobal<3>]) -> FrictionGlobal<3> {
+    let places = |of: fn(&FrictionGlobal<3>) -> usize| {
+        let numbers = parts.iter().enumerate().flat_map(|(k, p)| (0..of(p)).map(move |i| (i, k)));
+        let mut all: Vec<_> = numbers.collect();
+        all.sort_unstable();
+        all
+    };
+    let (contacts, dofs) = (places(|p| p.mu.len()), places(|p| p.f.len()));
+    let contact = |k: usize, c: usize| contacts.binary_search(&(c, k)).unwrap();
+    let dof = |k: usize, i: usize| dofs.binary_search(&(i, k)).unwrap();
+    let row = |k: usize, j: usize| 3 * contact(k, j / 3) + j % 3;
+    let (mut m, mut h) = (vec![], vec![]);
+    let (mut f, mut w) = (vec![0.0; dofs.len()], vec![0.0; 3 * contacts.len()]);
+    let mut mu = vec![0.0; contacts.len()];
+    for (k, p) in parts.iter().enumerate() {
+        m.extend(p.M.triplets().map(|(i, j, x)| (dof(k, i), dof(k, j), x)));
+        h.extend(p.H.triplets().map(|(i, j, x)| (dof(k, i), row(k, j), x)));
+        p.f.iter().enumerate().for_each(|(i, x)| f[dof(k, i)] = *x);
+        p.w.iter().enumerate().for_each(|(j, x)| w[row(k, j)] = *x);
+        p.mu.iter().enumerate().for_each(|(c, x)| mu[contact(k, c)] = *x);
+    }
+    let m = Csc::from_triplets(dofs.len(), dofs.len(), m.into_iter()).unwrap();
+    let h = Csc::from_triplets(dofs.len(), w.len(), h.into_iter()).unwrap();
+    FrictionGlobal::new(m, h, f, w, mu).unwrap()
+}
+
+#[test]
+fn islands_are_solved_apart() {
+    let mut failed = vec![];
+    for seed in 0..6 {
+        // Of different sizes and loads, down to a ten-millionth of the largest; in the last nothing happens.
+        let part = |(k, (contacts, loads)): (u64, (usize, f64))| {
+            let dofs = 2 * contacts;
+            let case =
+                Planted { contacts, dofs, mix: MIXED, seed: 7 * seed + k, ..Planted::default() };
+            let mut part = case.global::<3>().0;
+            part.f.iter_mut().chain(&mut part.w).for_each(|x| *x *= loads);
+            part
+        };
+        let sizes = [(14, 1.0), (9, 1e-3), (3, 30.0), (11, 1e-7), (2, 0.0)];
+        let parts: Vec<_> = (0..).zip(sizes).map(part).collect();
+        let whole = among_each_other(&parts);
+        let what = format!("five islands, seed {seed}");
+        for tolerance in [1e-4, 1e-8, TIGHT] {
+            failed.extend(all_forms_to(tolerance, &whole, &what));
+        }
+        let end = run(&whole, "auto", &[], &within(1e-8, SECONDS));
+        let apart = end.account.iter().any(|line| line.contains(" islands, in "));
+        assert!(apart, "{what}: {:?}", end.account);
+        // One that has no solution leaves the others none.
+        let hopeless = among_each_other(&[whole, squeezed(4, 0.4)]);
+        refuted(&hopeless, "auto", &what);
+        refuted(&Condense.reduce(&hopeless).unwrap().0, "auto", &what);
+    }
+    none(failed);
+}
+
 #[test]
 fn contradictory_constraints_are_refuted() {
     let (mut problem, _) = Planted { bilateral: 3, ..Planted::default() }.global::<3>();

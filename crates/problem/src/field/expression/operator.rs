@@ -274,6 +274,10 @@ fn whole_power<T: Number>(a: T, k: u32) -> T {
 
 fn power<T: Number>(a: T, b: T) -> T {
     let (x, y) = (a.value(), b.value());
+    // To the power of zero, or as that of one, it would have a value.
+    if x.is_nan() || y.is_nan() {
+        return T::known(f64::NAN);
+    }
     if y.fract() == 0.0 && y.abs() <= PRODUCTS {
         let power = whole_power(a, y.abs() as u32);
         return if y < 0.0 { T::known(1.0).div(power) } else { power };
@@ -289,6 +293,11 @@ fn truth(yes: bool) -> f64 {
     f64::from(u8::from(yes))
 }
 
+/// Of a comparison: none where an argument has no value.
+fn compared((x, y): (f64, f64), yes: bool) -> f64 {
+    if x.is_nan() || y.is_nan() { f64::NAN } else { truth(yes) }
+}
+
 impl Unary {
     /// The value at a.
     #[inline]
@@ -300,6 +309,8 @@ impl Unary {
             Self::Sqrt => return a.sqrt(),
             Self::Square => return a.mul(a),
             Self::Exp => x.exp(),
+            // At zero it has no value: what is made of −∞ may be finite.
+            Self::Log | Self::Log10 if x == 0.0 => f64::NAN,
             Self::Log => x.ln(),
             Self::Log10 => x.log10(),
             Self::Sin => x.sin(),
@@ -317,7 +328,7 @@ impl Unary {
             Self::Logistic => 1.0 / (1.0 + (-x).exp()),
             Self::Floor => x.floor(),
             Self::Ceil => x.ceil(),
-            Self::Not => truth(x == 0.0),
+            Self::Not => compared((x, x), x == 0.0),
         };
         a.smooth(value, self.slope(x, value))
     }
@@ -379,7 +390,7 @@ impl Binary {
         let value = match self {
             Self::Less => {
                 let difference = a.sub(b);
-                return if difference.value() > 0.0 { difference } else { T::known(0.0) };
+                return if difference.value() <= 0.0 { T::known(0.0) } else { difference };
             }
             Self::Rem => x % y,
             Self::Atan2 => x.atan2(y),
@@ -391,15 +402,18 @@ impl Binary {
             }
             Self::Round => by_decimals(x, y, f64::round),
             Self::Trunc => by_decimals(x, y, f64::trunc),
-            Self::Lt => truth(x < y),
-            Self::Le => truth(x <= y),
-            Self::Eq => truth(x == y),
-            Self::Ge => truth(x >= y),
-            Self::Gt => truth(x > y),
-            Self::Ne => truth(x != y),
-            Self::And => truth(x != 0.0 && y != 0.0),
-            Self::Or => truth(x != 0.0 || y != 0.0),
-            Self::Iff => truth((x != 0.0) == (y != 0.0)),
+            Self::Lt => compared((x, y), x < y),
+            Self::Le => compared((x, y), x <= y),
+            Self::Eq => compared((x, y), x == y),
+            Self::Ge => compared((x, y), x >= y),
+            Self::Gt => compared((x, y), x > y),
+            Self::Ne => compared((x, y), x != y),
+            // The second counts where the first leaves it open.
+            Self::And if x == 0.0 => 0.0,
+            Self::And => compared((x, y), y != 0.0),
+            Self::Or if x != 0.0 && !x.is_nan() => 1.0,
+            Self::Or => compared((x, y), y != 0.0),
+            Self::Iff => compared((x, y), (x != 0.0) == (y != 0.0)),
             Self::Add | Self::Sub | Self::Mul | Self::Div | Self::Pow => unreachable!("above"),
         };
         a.smooth2(b, value, slopes2(self, x, y, value))
@@ -443,15 +457,24 @@ impl Nary {
     #[inline]
     pub(super) fn of<T: Number>(self, arguments: impl Iterator<Item = T> + Clone) -> T {
         let truths = || arguments.clone().filter(|a| a.value() != 0.0).count();
+        // The first that is as `sought` ends a conjunction or an alternative; before it each needs a value.
+        let ends = |sought: fn(f64) -> bool| {
+            let mut values = arguments.clone().map(T::value);
+            values.find(|x| x.is_nan() || sought(*x))
+        };
+        let has_values = || arguments.clone().all(|a| !a.value().is_nan());
         match self {
+            Self::Count | Self::NumberOf | Self::AllDiff | Self::SomeSame if !has_values() => {
+                T::known(f64::NAN)
+            }
             Self::Sum => arguments.reduce(T::add).unwrap_or(T::known(0.0)),
             Self::Min | Self::Max => match self.chosen(arguments.clone().map(T::value)) {
                 Some(k) => arguments.clone().nth(k).unwrap_or(T::known(f64::NAN)),
                 None => T::known(f64::NAN),
             },
             Self::Count => T::known(truths() as f64),
-            Self::All => T::known(truth(truths() == arguments.clone().count())),
-            Self::Any => T::known(truth(truths() > 0)),
+            Self::All => T::known(ends(|x| x == 0.0).map_or(1.0, |x| 0.0 * x)),
+            Self::Any => T::known(ends(|x| x != 0.0).map_or(0.0, |x| compared((x, x), true))),
             Self::NumberOf => {
                 let mut all = arguments.map(T::value);
                 let sought = all.next();

@@ -146,6 +146,37 @@ fn undefined_values_are_said() {
     assert!(run.value(&[1.0], &mut [0.0]));
 }
 
+/// What has no value has none either where a comparison, a power or an operation that forgets its argument is made of it.
+#[test]
+fn what_is_undefined_stays_so() {
+    for (text, x) in [
+        ("1 + less(sqrt(x), 2)", -2.0),
+        ("1 - less(exp(x), 2*x)", 1000.0),
+        ("if(sqrt(x) > 2, -1, 1)", -2.0),
+        ("1 + (log(x) > 2)", -2.0),
+        ("1 + (2 == sqrt(x))", -2.0),
+        ("1 + !sqrt(x)", -2.0),
+        ("1 + (sqrt(x) && 1)", -2.0),
+        ("1 + (0 || sqrt(x))", -2.0),
+        ("1 + sqrt(x)^0", -2.0),
+        ("1^sqrt(x)", -2.0),
+        ("1 + exp(log(x))", 0.0),
+        ("max(log(x), x)", 0.0),
+    ] {
+        let field = Expressions::parse(&[text.into()], &["x".into()]).unwrap();
+        let mut run = field.evaluator();
+        assert!(!run.value(&[x], &mut [0.0]), "{text}");
+        assert!(!run.precisely(&[x], &mut [0.0]), "{text}, precisely");
+        assert!(run.value(&[3.0], &mut [0.0]), "{text} at 3");
+    }
+    // What is not asked need not have a value.
+    for (text, value) in [("(0 && sqrt(x)) + 1", 1.0), ("(1 || sqrt(x)) + 1", 2.0)] {
+        let field = Expressions::parse(&[text.into()], &["x".into()]).unwrap();
+        let mut f = [0.0];
+        assert!(field.evaluator().value(&[-2.0], &mut f) && f == [value], "{text}");
+    }
+}
+
 #[test]
 fn affine_rows_have_their_coefficients() {
     let mut g = Graph::new(2);

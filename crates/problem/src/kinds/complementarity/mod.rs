@@ -29,6 +29,10 @@ macro_rules! problem_in_z {
                 $crate::LcpPoint { z: $origin }
             }
 
+            fn validate(&self) -> Result<(), $crate::ProblemError> {
+                Self::validate(self)
+            }
+
             fn validate_point(&self, point: &Self::Point) -> Result<(), $crate::ProblemError> {
                 $crate::error::vector("z", &point.z, self.unknowns(), "variables")
             }

@@ -9,7 +9,7 @@ pub mod planted;
 mod rows;
 
 pub use global::{Dynamics, FrictionGlobal, GlobalGauge, GlobalPoint, RollingGlobal, RowsGlobal};
-pub use judge::{ContactStatus, Impulses, Law, Motion, Weighed};
+pub use judge::{ContactStatus, Impulses, Law, Motion, Weighed, friction_rows};
 pub use law::{Coulomb, Rolling, RollingData};
 pub use local::{FrictionLocal, LocalGauge, LocalPoint, RollingLocal, RowsLocal};
 pub use rows::Bounds;

@@ -21,7 +21,7 @@ use super::complementarity::stated::{Part, Parts, Shape, Stated, of_jacobian, pl
 use crate::check::proof::Exactly;
 use crate::check::{Certificate, ConeSystem, Evidence, Judged, Measure, Relaxed, VerdictOf, weigh};
 use crate::error::vector;
-use crate::field::{Expressions, Field, same};
+use crate::field::{Expressions, Field, fits, same};
 use crate::{Kind, LcpPoint, Mcp, OfAny, Problem, ProblemError};
 
 /// The variational inequality: find x ∈ X with `F(x)ᵀ(y − x) ≥ 0` for all y ∈ X; that is `x = P_X(x − γ F(x))` for any γ > 0.
@@ -84,6 +84,7 @@ impl Vi {
             let expected = format!("{n} rows (variables of the set)");
             return Err(ProblemError::shape("F", expected, rows.to_string()));
         }
+        fits(&*self.F)?;
         vector("start", &self.start, n, "variables of the set")
     }
 
@@ -129,6 +130,10 @@ impl Problem for Vi {
 
     fn origin(&self) -> LcpPoint {
         LcpPoint { z: self.start.clone() }
+    }
+
+    fn validate(&self) -> Result<(), ProblemError> {
+        Self::validate(self)
     }
 
     fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {

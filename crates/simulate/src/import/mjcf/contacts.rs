@@ -25,29 +25,87 @@ pub(super) struct Contacts {
 type Class = (BTreeSet<[u32; 2]>, Option<usize>);
 
 impl Contacts {
-    pub fn read(root: &Element, defaults: &Defaults, tree: &Tree) -> Result<Self, SimulateError> {
+    /// Says in the tree what is left out; refuses what would make other bodies touch.
+    pub fn read(
+        root: &Element,
+        defaults: &Defaults,
+        tree: &mut Tree,
+    ) -> Result<Self, SimulateError> {
+        let mut said = vec![];
+        let this = Self::of_tree(root, defaults, tree, &mut said)?;
+        tree.said.extend(said);
+        Ok(this)
+    }
+
+    fn of_tree(
+        root: &Element,
+        defaults: &Defaults,
+        tree: &Tree,
+        said: &mut Vec<String>,
+    ) -> Result<Self, SimulateError> {
         let numbers = tree.numbers();
         // The body of the scene that a body is part of.
         let part_of = |k: usize| match tree.carrier(k) {
             0 => k,
             carrier => carrier,
         };
+        let touching = |k: usize| tree.bodies[k].geoms.iter().filter(|g| g.shape.is_some());
+        // Groups are of bodies as a whole.
+        let alone = |k: usize| {
+            let others = (0..tree.bodies.len()).filter(|&i| i != k && part_of(i) == part_of(k));
+            others.map(touching).all(|mut geoms| geoms.next().is_none())
+        };
         let mut apart: BTreeSet<[usize; 2]> = BTreeSet::new();
         for element in root.named("contact").flat_map(|c| c.named("exclude")) {
             let item = defaults.item(element, MAIN)?;
-            let of = |name: &str| {
+            let mut of = |name: &str| {
                 let body = item.text(name).unwrap_or_default();
-                let found = numbers.get(body).map(|&k| part_of(k));
-                found.ok_or_else(|| item.wrong(format!("a body as `{name}`"), format!("`{body}`")))
+                let found = numbers.get(body).copied();
+                let k = found.ok_or_else(|| {
+                    item.wrong(format!("a body as `{name}`"), format!("`{body}`"))
+                })?;
+                if !alone(k) {
+                    said.push(format!(
+                        "{}: of `{body}` all that moves with it is excluded, too",
+                        item.key()
+                    ));
+                }
+                Ok::<_, SimulateError>(part_of(k))
             };
             let (a, b) = (of("body1")?, of("body2")?);
             apart.insert([a.min(b), a.max(b)]);
         }
+        for element in root.named("contact").flat_map(|c| c.named("pair")) {
+            let item = defaults.item(element, MAIN)?;
+            let of = |name: &str| {
+                let geom = item.text(name).unwrap_or_default();
+                let named = |g: &&Geom| g.item.text("name") == Some(geom);
+                let found = (0..tree.bodies.len())
+                    .find_map(|k| Some((part_of(k), touching(k).find(named)?.touch.bits)));
+                // A geom without bits touches nothing else, and is no shape of the scene.
+                found.ok_or_else(|| {
+                    let expected = format!("a geom that touches by its bits as `{name}`");
+                    item.wrong(expected, format!("`{geom}`"))
+                })
+            };
+            let ((a, p), (b, q)) = (of("geom1")?, of("geom2")?);
+            let meet = p[0] & q[1] | q[0] & p[1] != 0 && !apart.contains(&[a.min(b), a.max(b)]);
+            if !meet || a == b {
+                return Err(item.wrong("geoms that touch without it", "two that do not"));
+            }
+            said.push(format!("{}: left out: the two touch as their materials say", item.key()));
+        }
         let mut bits: Vec<BTreeSet<[u32; 2]>> = vec![BTreeSet::new(); tree.bodies.len()];
         let mut materials: Vec<Touch> = vec![];
-        for (k, body) in tree.bodies.iter().enumerate() {
-            for geom in body.geoms.iter().filter(|g| g.shape.is_some()) {
-                bits[part_of(k)].insert(geom.touch.bits);
+        for k in 0..tree.bodies.len() {
+            for geom in touching(k) {
+                let all = &mut bits[part_of(k)];
+                if all.insert(geom.touch.bits) && all.len() == 2 {
+                    said.push(format!(
+                        "{}: other bits than those of other geoms of the body, which touches as a whole whatever one of them touches",
+                        geom.item.key()
+                    ));
+                }
                 if !materials.iter().any(|m| alike(m, &geom.touch)) {
                     materials.push(geom.touch);
                 }

@@ -184,6 +184,9 @@ impl<'a> Assets<'a> {
         let place = around.then(&own);
         let mass = match (heavy, item.some::<1>("mass")?) {
             (false, _) => None,
+            (true, Some([mass])) if mass < 0.0 => {
+                return Err(item.wrong("a mass of at least 0", mass));
+            }
             (true, Some([mass])) => {
                 let like = solid.mass(1.0).map_err(|e| item.wrong("a solid", e))?;
                 like.filter(|_| mass > 0.0).map(|like| MassProperties {
@@ -235,8 +238,8 @@ impl MeshAsset<'_> {
     /// The surface, as a solid where a mass is asked for.
     fn shape(&self, compiler: &Compiler, heavy: bool) -> Result<(Solid, Value), SimulateError> {
         let item = &self.item;
-        if item.text("inertia").is_some_and(|kind| kind == "shell") && heavy {
-            return Err(item.wrong("a solid", "`inertia` shell"));
+        if let Some(kind) = item.text("inertia").filter(|kind| *kind != "exact" && heavy) {
+            return Err(item.wrong("a mesh with its exact inertia", format!("`inertia` {kind}")));
         }
         let by = item.some::<3>("scale")?.unwrap_or([1.0; 3]);
         let origin = item.some::<3>("refpos")?.unwrap_or_default();

@@ -43,7 +43,7 @@ pub fn mjcf(text: &str, folder: &Path) -> Result<Imported, SimulateError> {
     let assets = Assets::read(&root, &defaults, &compiler)?;
     let mut tree = Tree::read(&root, &defaults, &compiler, &assets, said)?;
     let controls = keyframe(&root, &defaults, &mut tree)?;
-    let contacts = Contacts::read(&root, &defaults, &tree)?;
+    let contacts = Contacts::read(&root, &defaults, &mut tree)?;
     let mut bodies = vec![];
     for k in 0..tree.bodies.len() {
         if let Some(mut body) = body(&tree, &compiler, &contacts, k)? {
@@ -140,12 +140,20 @@ fn body(
     } else {
         let mut masses: Vec<MassProperties> = vec![];
         let mut force = [0.0; 3];
+        let mut lifts: Vec<f64> = vec![];
         for &i in &members {
             let inner = frame.back().then(&tree.bodies[i].at);
             masses.extend(tree.bodies[i].masses.iter().map(|m| inner.mass(m)));
             let lift = tree.bodies[i].item.real("gravcomp", 0.0)?;
             let mass: f64 = tree.bodies[i].masses.iter().map(|m| m.mass).sum();
             force = sub(force, scale(lift * mass, compiler.gravity));
+            if mass > 0.0 {
+                lifts.push(lift);
+            }
+        }
+        if let Some(other) = lifts.iter().find(|lift| **lift != lifts[0]) {
+            let found = format!("{} and {other}, whose lift has a moment", lifts[0]);
+            return Err(own.item.wrong("one `gravcomp` of all that moves as one body", found));
         }
         let joined = MassProperties::joined(&masses);
         if masses.is_empty() || joined.mass.is_nan() || joined.mass <= 0.0 {

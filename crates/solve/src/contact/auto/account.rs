@@ -3,7 +3,7 @@
 use nonsmooth_problem::check::Kinematic;
 
 use super::{Auto, HybridWork, Stage};
-use crate::contact::form::{Disked, Holding, Linearised, OnContacts};
+use crate::contact::form::{Disked, Linearised, OnContacts, Parted};
 
 /// Where the solve began.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -57,10 +57,7 @@ pub(super) struct Done {
 }
 
 /// One line for each stage that came, in the order of the stages.
-pub(super) fn of<
-    P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send,
-    const D: usize,
->(
+pub(super) fn of<P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send, const D: usize>(
     auto: &OnContacts<Auto, D>,
     work: &HybridWork<P, D>,
 ) -> Vec<String> {
@@ -131,6 +128,9 @@ pub(super) fn of<
             "{} convex problems with given sliding speeds, to {:.1e}",
             work.done.convex, work.done.convex_error
         ));
+    }
+    if let Some(apart) = work.apart.as_ref().filter(|apart| apart.was_used()) {
+        lines.push(apart.account(auto));
     }
     if let Some(held) = &work.held {
         let [sets, rows] = held.counts();

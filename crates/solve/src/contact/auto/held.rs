@@ -15,7 +15,7 @@ use nonsmooth_problem::check::Kinematic;
 
 use super::starts::lost;
 use super::{Auto, FIRST, HybridWork, SWEEPS_A_STEP, Stage, runs_away};
-use crate::contact::form::{Disked, Holding, Linearised, OnContacts};
+use crate::contact::form::{Disked, Linearised, OnContacts, Parted};
 use crate::contact::parts::{asked, put_within_bounds};
 use crate::{SolveError, Solver, Step};
 
@@ -34,7 +34,7 @@ const AGAIN: usize = 10;
 impl<const D: usize> OnContacts<Auto, D> {
     /// After sweeps over contacts and rows with bounds, whose last one moved so much.
     pub(super) fn sweep_with_rows<
-        P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send,
+        P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send,
     >(
         &self,
         problem: &P,
@@ -76,7 +76,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// A step on the problem without the rows at their bounds.
-    pub(super) fn hold<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
+    pub(super) fn hold<P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -128,7 +128,7 @@ pub(super) enum Came {
 
 impl<P, const D: usize> Held<P, D>
 where
-    P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send,
+    P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send,
 {
     /// Begins with the rows that are at their bounds at a point, whose velocities `state` has.
     pub(super) fn begin(

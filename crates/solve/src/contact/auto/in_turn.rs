@@ -22,14 +22,20 @@
 //! Fails: where all bodies move (flows), B is all there is. Where what moves depends on which of many impulses hold it, the impulses may not be found; the caller keeps the best.
 
 use nonsmooth_linalg::{Csc, Groups, budget, norm, small};
+use nonsmooth_problem::check::Kinematic;
 use nonsmooth_problem::{FrictionGlobal, GlobalPoint, Problem};
 
-use super::Auto;
-use super::starts::Halvings;
-use crate::contact::form::{Access, Contacts, OnContacts};
+use super::starts::{Halvings, lost};
+use super::{Auto, HybridWork, Stage};
+use crate::Step;
+use crate::contact::form::{Access, Contacts, Disked, Linearised, OnContacts};
 use crate::contact::law::DiskLaw;
 use crate::contact::parts::Central;
 use crate::core::drive::{Driver, Limits, Session, Status};
+
+/// Motion and impulses in turn have come near enough for Newton's iterations; where the impulses of rest come no nearer than this, nearly all moves.
+const TURNED: f64 = 1e-6;
+const NOT_AT_REST: f64 = 1.5e-2;
 
 /// Fewer bodies than this are no structure of which a part could rest.
 const BODIES: usize = 8;
@@ -300,6 +306,62 @@ impl<L: DiskLaw<D>, const D: usize> InTurn<L, D> {
 
 fn count(which: &[bool]) -> usize {
     which.iter().filter(|is| **is).count()
+}
+
+impl<const D: usize> OnContacts<Auto, D> {
+    /// Begins stage 9, once, where the problem is stated by its bodies.
+    pub(super) fn begin_turns<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+    ) -> bool {
+        let HybridWork { in_turn, stage, turned, scale, tolerance, .. } = work;
+        if std::mem::replace(turned, true) || !self.0.in_turn {
+            return false;
+        }
+        let begun = problem.bodies().and_then(|bodies| InTurn::begin(bodies, *scale, *tolerance));
+        *in_turn = begun.map(Box::new);
+        if in_turn.is_some() {
+            *stage = Stage::InTurn;
+        }
+        in_turn.is_some()
+    }
+
+    /// Stage 9: a step of motion and impulses in turn; at its end the best of their rounds goes on where it is better than the point.
+    pub(super) fn take_turns<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Step {
+        let HybridWork { in_turn, newton, state, done, inner_best, controller, .. } = work;
+        let (Some(turns), Some(bodies), Some(newton)) = (in_turn, problem.bodies(), newton) else {
+            return lost();
+        };
+        let mut ended = false;
+        match turns.step(bodies) {
+            Came::Further => {}
+            Came::Round => {
+                done.turns = turns.counts();
+                let error = newton.look(problem, state, turns.impulses());
+                if done.turns[0] == 1 || error < done.turned_error {
+                    done.turned_error = error;
+                    inner_best.copy_from_slice(turns.impulses());
+                }
+                ended = error < TURNED || done.turns[0] == 1 && error > NOT_AT_REST;
+            }
+            Came::End => ended = true,
+        }
+        if ended {
+            let r = P::impulses(point);
+            if done.turns[0] > 0 && done.turned_error < controller.least() {
+                r.copy_from_slice(inner_best);
+            }
+            work.in_turn = None;
+            self.subproblem_here(problem, point, work);
+        }
+        Step::Continue { estimate: f64::NAN }
+    }
 }
 
 /// The unknowns in groups that are bodies, as far as M and H tell: what M couples, and neighbours in order of which one is touched wherever the other is (a contact along an axis

@@ -7,7 +7,7 @@
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
 //!    still move are followed where they are few ([`Sweep::follow`]), or the sweeps are accelerated, where a trial shows that it helps: one by one from the fifth on
-//!    ([`EarlyAcceleration`]), else ten at a time after thirty ([`Acceleration`]).
+//!    ([`EarlyAcceleration`]), else ten at a time after thirty ([`Acceleration`]). A problem that falls apart into islands is solved island by island after a few of them (`apart.rs`).
 //! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart: after five of them where they
 //!    still move much, else after the others. One factorisation and a few solves end structures at rest, whatever their height; two solves tell where nothing comes of it. Where contacts
 //!    open because weights have yet to come down to them, as in walls with head joints, it comes at once where they open slowly, when the sweeps have cost a factorisation where they open fast.
@@ -46,6 +46,7 @@
 
 mod accelerated;
 mod account;
+mod apart;
 mod cadoux;
 mod controller;
 mod held;
@@ -54,7 +55,7 @@ mod proximal_newton;
 mod relaxed;
 mod starts;
 
-use nonsmooth_linalg::budget;
+use nonsmooth_linalg::{Groups, budget};
 use nonsmooth_problem::check::{Existence, Kinematic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,7 +63,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::auto::proximal_newton::ProximalNewton;
 use crate::contact::existence;
 use crate::contact::form::{
-    Access, Blockwise, Costs, Disked, Holding, Linearised, OnContacts, has_bounds,
+    Access, Blockwise, Costs, Disked, Linearised, OnContacts, Parted, has_bounds,
 };
 use crate::contact::law::local::{LocalSolver, Projection};
 use crate::contact::parts::{
@@ -73,10 +74,11 @@ use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::{Limits, SolveError, Solver, Step};
 use account::{Done, Start};
+use apart::Apart;
 use cadoux::Cadoux;
 use controller::{Controller, Origin, Verdict};
 use held::Held;
-use in_turn::{Came, InTurn};
+use in_turn::InTurn;
 use starts::{Halvings, PassedBy};
 
 /// The hyperparameters of `auto`; none needs to be set.
@@ -142,9 +144,6 @@ const NEAR: f64 = 1e-4;
 const SWEEP_ABOVE: f64 = 1e-9;
 /// ω of the sweeps with one projection a contact, as that of `psor`.
 const OMEGA: f64 = 1.3;
-/// Motion and impulses in turn have come near enough for Newton's iterations; where the impulses of rest come no nearer than this, nearly all moves.
-const TURNED: f64 = 1e-6;
-const NOT_AT_REST: f64 = 1.5e-2;
 /// Sweeps that raise the error by more than this factor are taken back.
 const TAKE_BACK: f64 = 5.0;
 /// Problems of so few unknowns are enumerated after so many Newton iterations: milliseconds, and a last word.
@@ -166,6 +165,10 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     cadoux: Option<Box<Cadoux<P::Law, D>>>,
     /// It comes at a change of strategy after so many of them.
     cadoux_after: usize,
+    apart: Option<Box<Apart<P, D>>>,
+    /// Whether the problem falls apart has been asked; room for it.
+    parted: bool,
+    groups: Groups,
     held: Option<Box<Held<P, D>>>,
     /// So many sweeps come before the next search for the rows at their bounds.
     hold_after: usize,
@@ -241,6 +244,7 @@ enum Stage {
     Pursuit { halvings: Halvings, most: usize },
     Alternating,
     Held,
+    Apart,
 }
 
 impl Stage {
@@ -248,7 +252,7 @@ impl Stage {
     fn stands_still(self) -> bool {
         use Stage::*;
         let starts = matches!(self, Rest | Interior { .. } | Relaxed { .. });
-        starts || matches!(self, InTurn | Cadoux | Pursuit { .. } | Alternating)
+        starts || matches!(self, InTurn | Cadoux | Pursuit { .. } | Alternating | Apart)
     }
 }
 
@@ -264,7 +268,7 @@ enum RestSearch {
     Done,
 }
 
-impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: usize> Solver<P>
+impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send, const D: usize> Solver<P>
     for OnContacts<Auto, D>
 {
     type Work = HybridWork<P, D>;
@@ -282,6 +286,9 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             held: None,
             hold_after: FIRST_SWEEPS,
             searched_from: None,
+            apart: None,
+            parted: false,
+            groups: Groups::default(),
             alternating: None,
             central: None,
             pursuit: None,
@@ -343,18 +350,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
         } else {
             work.done.start = self.choose_start(problem, point, work);
         }
-        problem.enter(&mut work.state, point);
-        work.stage = FIRST;
-        work.rate.begin();
-        work.early.begin();
-        work.acceleration.begin();
-        (work.existence, work.exact, work.asked) = (None, None, false);
-        work.doubted = false;
-        (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
-        (work.turned, work.in_turn) = (false, None);
-        work.cadoux_after = 0;
-        (work.held, work.hold_after) = (None, FIRST_SWEEPS);
-        work.searched_from = None;
+        self.begin(problem, point, work);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -378,10 +374,14 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
             Stage::Pursuit { .. } => self.pursue(problem, point, work),
             Stage::Alternating => self.alternate(problem, point, work),
             Stage::Held => self.hold(problem, point, work),
+            Stage::Apart => self.part(problem, point, work),
         }
     }
 
     fn publish(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
+        if work.stage == Stage::Apart {
+            problem.enter(&mut work.state, point);
+        }
         match &work.exact {
             // Its velocities and multipliers are exact too.
             Some(exact) => P::copy_point(exact, point),
@@ -410,7 +410,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send, const D: u
     fn go_on(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> bool {
         work.doubted = true;
         // The first stage has yet to make the parts of the later ones, or fit them to this problem.
-        if !matches!(work.stage, Stage::Sweeps { .. } | Stage::Held) {
+        if !matches!(work.stage, Stage::Sweeps { .. } | Stage::Held | Stage::Apart) {
             problem.enter(&mut work.state, point);
             if !self.insist_on_cadoux(problem, work) {
                 self.subproblem_here(problem, point, work);
@@ -451,6 +451,31 @@ fn swept<P: Blockwise<D> + Disked<D>, S: LocalSolver<D, P::Law>, const D: usize>
 }
 
 impl<const D: usize> OnContacts<Auto, D> {
+    /// Begins stage 1 at a point.
+    fn begin<P: Linearised<D> + Disked<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) {
+        problem.enter(&mut work.state, point);
+        work.stage = FIRST;
+        work.rate.begin();
+        work.early.begin();
+        work.acceleration.begin();
+        (work.existence, work.exact, work.asked) = (None, None, false);
+        work.doubted = false;
+        (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
+        (work.turned, work.in_turn) = (false, None);
+        work.cadoux_after = 0;
+        work.parted = false;
+        if let Some(apart) = &mut work.apart {
+            apart.restart();
+        }
+        (work.held, work.hold_after) = (None, FIRST_SWEEPS);
+        work.searched_from = None;
+    }
+
     /// Puts zero in place of impulses from which a sweep ends farther off than from zero: a bad guess costs a sweep, contacts that came or
     /// went are no reason to refuse the rest of a good one, and of several solutions the one given stays.
     fn choose_start<P: Linearised<D> + Disked<D>>(
@@ -494,7 +519,7 @@ impl<const D: usize> OnContacts<Auto, D> {
     }
 
     /// Stage 1. `claims`: how often the sweeps thought that they had arrived.
-    fn sweep<P: Linearised<D> + Disked<D> + Kinematic<D> + Holding<D> + Send>(
+    fn sweep<P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send>(
         &self,
         problem: &P,
         point: &mut P::Point,
@@ -525,7 +550,8 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
             let swept = work.done.sweeps;
             if (GLANCE..GLANCE + together).contains(&swept)
-                && self.rests_at_a_glance(problem, point, work, estimate)
+                && (self.falls_apart(problem, point, work, estimate)
+                    || self.rests_at_a_glance(problem, point, work, estimate))
             {
                 return Step::Continue { estimate };
             }
@@ -815,60 +841,6 @@ impl<const D: usize> OnContacts<Auto, D> {
             self.subproblem_here(problem, point, work);
         }
         Step::Continue { estimate: error }
-    }
-
-    /// Begins stage 9, once, where the problem is stated by its bodies.
-    fn begin_turns<P: Linearised<D> + Disked<D> + Kinematic<D>>(
-        &self,
-        problem: &P,
-        work: &mut HybridWork<P, D>,
-    ) -> bool {
-        let HybridWork { in_turn, stage, turned, scale, tolerance, .. } = work;
-        if std::mem::replace(turned, true) || !self.0.in_turn {
-            return false;
-        }
-        let begun = problem.bodies().and_then(|bodies| InTurn::begin(bodies, *scale, *tolerance));
-        *in_turn = begun.map(Box::new);
-        if in_turn.is_some() {
-            *stage = Stage::InTurn;
-        }
-        in_turn.is_some()
-    }
-
-    /// Stage 9: a step of motion and impulses in turn; at its end the best of their rounds goes on where it is better than the point.
-    fn take_turns<P: Linearised<D> + Disked<D> + Kinematic<D>>(
-        &self,
-        problem: &P,
-        point: &mut P::Point,
-        work: &mut HybridWork<P, D>,
-    ) -> Step {
-        let HybridWork { in_turn, newton, state, done, inner_best, controller, .. } = work;
-        let (Some(turns), Some(bodies), Some(newton)) = (in_turn, problem.bodies(), newton) else {
-            return starts::lost();
-        };
-        let mut ended = false;
-        match turns.step(bodies) {
-            Came::Further => {}
-            Came::Round => {
-                done.turns = turns.counts();
-                let error = newton.look(problem, state, turns.impulses());
-                if done.turns[0] == 1 || error < done.turned_error {
-                    done.turned_error = error;
-                    inner_best.copy_from_slice(turns.impulses());
-                }
-                ended = error < TURNED || done.turns[0] == 1 && error > NOT_AT_REST;
-            }
-            Came::End => ended = true,
-        }
-        if ended {
-            let r = P::impulses(point);
-            if done.turns[0] > 0 && done.turned_error < controller.least() {
-                r.copy_from_slice(inner_best);
-            }
-            work.in_turn = None;
-            self.subproblem_here(problem, point, work);
-        }
-        Step::Continue { estimate: f64::NAN }
     }
 
     /// What follows from what is known of the existence of a solution, if something does.

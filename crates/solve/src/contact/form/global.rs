@@ -7,15 +7,15 @@
 
 use nonsmooth_linalg::budget::{self, TooLarge};
 use nonsmooth_linalg::{
-    Block, Bsr, Compensated, Csc, Delassus, Passes, Refine, Singular, norm_or_one, small,
+    Block, Bsr, Compensated, Csc, Delassus, Groups, Passes, Refine, Singular, norm_or_one, small,
 };
-use nonsmooth_problem::check::Impulses;
+use nonsmooth_problem::check::{Certificate, Impulses};
 use nonsmooth_problem::{Bounds, Dynamics, FrictionGlobal, GlobalPoint, RowsGlobal};
 
 use super::linearised::{BodyForm, ContactForm, Form, Once, System, made, there, unaffordable};
 use super::{
-    Access, Blockwise, Concurrent, Contacts, Costs, DETERMINED, Frictional, Holding, Linear,
-    Linearised, MANY, Rows, Visits, held_and_left,
+    Access, Blockwise, Concurrent, Contacts, Costs, DETERMINED, Frictional, Linear, Linearised,
+    MANY, Parted, Rows, Visits, held_and_left, lifted, of_contacts, of_each, rolling_of, rows_of,
 };
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
@@ -296,7 +296,7 @@ impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionGlobal<D, L> {
     }
 }
 
-impl<const D: usize, L: DiskLaw<D>> Holding<D> for FrictionGlobal<D, L> {
+impl<const D: usize, L: DiskLaw<D>> Parted<D> for FrictionGlobal<D, L> {
     fn holding(&self, held: &[Option<f64>]) -> Self {
         let Some(b) = &self.rows else { return self.clone() };
         let (loads, left) = held_and_left(held);
@@ -305,6 +305,72 @@ impl<const D: usize, L: DiskLaw<D>> Holding<D> for FrictionGlobal<D, L> {
         let given = left.iter().map(|&j| b.b[j]).collect();
         let rows = RowsGlobal::bilateral(b.G.columns(&left), given);
         Self { f, rows: (!left.is_empty()).then_some(rows), ..self.clone() }
+    }
+
+    fn join(&self, groups: &mut Groups) {
+        let nc = self.contacts();
+        groups.restart(nc + self.dofs());
+        for (i, j, x) in self.H.triplets() {
+            if x != 0.0 {
+                groups.join(j / D, nc + i);
+            }
+        }
+        for (i, j, x) in self.M.triplets() {
+            if x != 0.0 {
+                groups.join(nc + i, nc + j);
+            }
+        }
+    }
+
+    fn island(&self, members: &[usize]) -> Self {
+        let (none, mu_r) = (|| Csc::zeros(0, 0), L::Rolling::default());
+        let (f, w, mu) = (vec![], vec![], vec![]);
+        let mut island = Self { M: none(), H: none(), f, w, mu, mu_r, rows: None };
+        self.island_again(members, &mut island);
+        island
+    }
+
+    fn island_again(&self, members: &[usize], island: &mut Self) {
+        let nc = self.contacts();
+        let (contacts, dofs) = members.split_at(members.partition_point(|&x| x < nc));
+        // An entry that is stored and zero may lie in another group.
+        let place = |dof: usize| dofs.binary_search(&(nc + dof)).ok();
+        let own = || dofs.iter().map(|&dof| dof - nc);
+        part(&self.M, own(), (dofs.len(), place), &mut island.M);
+        part(&self.H, rows_of::<D>(0, contacts), (dofs.len(), place), &mut island.H);
+        of_each(&self.f, own(), &mut island.f);
+        of_contacts::<D>(&self.w, contacts, &mut island.w);
+        of_each(&self.mu, contacts.iter().copied(), &mut island.mu);
+        island.mu_r = rolling_of(&self.mu_r, contacts);
+    }
+
+    fn lifted(&self, members: &[usize], certificate: Certificate) -> Certificate {
+        let (nc, n) = (self.contacts(), self.dofs());
+        let (contacts, dofs) = members.split_at(members.partition_point(|&x| x < nc));
+        let laws: Vec<L> = (0..nc).map(|c| Contacts::law(self, c)).collect();
+        let own = dofs.iter().map(|&dof| dof - nc);
+        let given: Vec<usize> = own.chain(rows_of::<D>(n, contacts)).collect();
+        lifted(&laws, contacts, (&given, n + self.w.len()), certificate)
+    }
+}
+
+/// The entries of `a` in some columns and in the rows that have a `place` among so many, if they are not what `part` has.
+fn part(
+    a: &Csc,
+    columns: impl Iterator<Item = usize> + Clone,
+    (rows, place): (usize, impl Fn(usize) -> Option<usize> + Copy),
+    part: &mut Csc,
+) {
+    let entries = || {
+        columns.clone().enumerate().flat_map(move |(k, j)| {
+            let (rows, values) = a.column(j);
+            let entry = move |(&i, &x): (&usize, &f64)| Some((place(i)?, k, x));
+            rows.iter().zip(values).filter_map(entry)
+        })
+    };
+    let count = columns.clone().count();
+    if (part.nrows(), part.ncols()) != (rows, count) || !part.triplets().eq(entries()) {
+        *part = Csc::from_triplets(rows, count, entries()).expect("places in range");
     }
 }
 

@@ -4,16 +4,16 @@
 //! constraints (a singular, positive semidefinite R) are honoured. Rows with bounds stay ([`Bounded`]); the q of the view holds what they do.
 
 use nonsmooth_linalg::{
-    Block, Bsr, Compensated, Csc, Delassus, Inverse, Refine, Singular, norm_or_one, small,
+    Block, Bsr, Compensated, Csc, Delassus, Groups, Inverse, Refine, Singular, norm_or_one, small,
 };
-use nonsmooth_problem::check::{Impulses, Kinematic};
+use nonsmooth_problem::check::{Certificate, Impulses, Kinematic};
 use nonsmooth_problem::{Bounds, FrictionLocal, LocalPoint, RowsLocal};
 
-use super::held_and_left;
 use super::linearised::{ContactForm, Form, Once, System, made, there, unaffordable};
 use super::rows::Bounded;
 use super::{
-    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Holding, Linear, Linearised, Rows,
+    Access, Blockwise, Concurrent, Contacts, Costs, Frictional, Linear, Linearised, Parted, Rows,
+    held_and_left, lifted, of_contacts, of_each, rolling_of, rows_of,
 };
 use crate::SolveError;
 use crate::contact::law::DiskLaw;
@@ -276,7 +276,7 @@ impl<const D: usize, L: DiskLaw<D>> Rows<D> for FrictionLocal<D, L> {
     }
 }
 
-impl<const D: usize, L: DiskLaw<D>> Holding<D> for FrictionLocal<D, L> {
+impl<const D: usize, L: DiskLaw<D>> Parted<D> for FrictionLocal<D, L> {
     fn holding(&self, held: &[Option<f64>]) -> Self {
         let Some(b) = &self.rows else { return self.clone() };
         let (loads, left) = held_and_left(held);
@@ -287,6 +287,45 @@ impl<const D: usize, L: DiskLaw<D>> Holding<D> for FrictionLocal<D, L> {
         let s = left.iter().map(|&j| s[j]).collect();
         let rows = RowsLocal::bilateral(b.V.columns(&left), own, s);
         Self { q, rows: (!left.is_empty()).then_some(rows), ..self.clone() }
+    }
+
+    fn join(&self, groups: &mut Groups) {
+        groups.restart(self.mu.len());
+        for c in 0..self.mu.len() {
+            for &other in self.W.row(c).0 {
+                groups.join(c, other as usize);
+            }
+            if groups.count() == 1 {
+                return;
+            }
+        }
+    }
+
+    fn island(&self, contacts: &[usize]) -> Self {
+        let (w, mu_r) = (Bsr::from_rows(contacts.len(), &[]), L::Rolling::default());
+        let mut island = Self { W: w, q: vec![], mu: vec![], mu_r, rows: None };
+        self.island_again(contacts, &mut island);
+        island
+    }
+
+    fn island_again(&self, contacts: &[usize], island: &mut Self) {
+        let rows = contacts.iter().map(|&c| self.W.row(c));
+        let lengths = rows.clone().map(|(columns, _)| columns.len());
+        let (_, columns, blocks) = island.W.lay_out(contacts.len(), lengths);
+        let place = |c: u32| contacts.binary_search(&(c as usize)).expect("one group") as u32;
+        let entries = rows.flat_map(|(columns, blocks)| columns.iter().zip(blocks));
+        for ((column, block), (&c, given)) in columns.iter_mut().zip(blocks).zip(entries) {
+            (*column, *block) = (place(c), *given);
+        }
+        of_contacts::<D>(&self.q, contacts, &mut island.q);
+        of_each(&self.mu, contacts.iter().copied(), &mut island.mu);
+        island.mu_r = rolling_of(&self.mu_r, contacts);
+    }
+
+    fn lifted(&self, contacts: &[usize], certificate: Certificate) -> Certificate {
+        let laws: Vec<L> = (0..self.mu.len()).map(|c| Contacts::law(self, c)).collect();
+        let given: Vec<usize> = rows_of::<D>(0, contacts).collect();
+        lifted(&laws, contacts, (&given, self.q.len()), certificate)
     }
 }
 

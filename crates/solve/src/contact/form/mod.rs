@@ -11,9 +11,9 @@
 //! | [`Linear`] | `u = W r + q` for all contacts | local (W), global (product form) |
 //! | [`Explicit`] | entries of matrices that state the symmetric part of W | local (W), global (M, H, G) |
 //! | [`Linearised`] | to solve `(Q + P W) x = b` with block-diagonal P, Q | local (in contact space), global (in velocity space) |
-//! | [`Holding`] | the problem without rows whose impulses are held | local, global |
+//! | [`Parted`] | the problem without rows whose impulses are held, or of an island alone | local, global |
 //!
-//! [`Regularised`] offers what the problem inside it does, but for [`Explicit`] and [`Holding`].
+//! [`Regularised`] offers what the problem inside it does, but for [`Explicit`] and [`Parted`].
 
 mod explicit;
 mod global;
@@ -22,9 +22,9 @@ mod local;
 mod regularised;
 mod rows;
 
-use nonsmooth_linalg::{Block, Moving, Passes, Singular, small};
-use nonsmooth_problem::check::Impulses;
-use nonsmooth_problem::{Bounds, FrictionGlobal, Problem};
+use nonsmooth_linalg::{Block, Groups, Moving, Passes, Singular, small};
+use nonsmooth_problem::check::{Certificate, Exact, ExactVector, Impulses, friction_rows};
+use nonsmooth_problem::{Bounds, FrictionGlobal, Problem, RollingData};
 
 pub use explicit::{Explicit, Model};
 pub use local::LocalState;
@@ -156,10 +156,79 @@ pub trait Rows<const D: usize>: Contacts<D> {
 /// What bilateral rows leave of the response of a row is rounding where it is at most this part of the response without them.
 const DETERMINED: f64 = 1e-12;
 
-/// Rows whose impulses are held.
-pub trait Holding<const D: usize>: Rows<D> + Sized {
+/// Problems that are parts of this one.
+pub trait Parted<const D: usize>: Rows<D> + Sized {
     /// The problem without the rows that are `held`, whose impulses are loads of it; the others, in their order, have no bounds there.
     fn holding(&self, held: &[Option<f64>]) -> Self;
+
+    /// Joins what feels each other, of the numbers of the contacts and, after them, of the unknowns that contacts may have beside their impulses. Of a problem without scalar rows.
+    fn join(&self, groups: &mut Groups);
+
+    /// The problem of one of these groups alone, by its members in ascending order.
+    fn island(&self, members: &[usize]) -> Self;
+
+    /// As [`island`](Self::island), in place of one of the same members; allocates nothing where what it is made of keeps its shape, of a global problem where M and H stay as they are.
+    fn island_again(&self, members: &[usize], island: &mut Self);
+
+    /// What says that an island has no solution, said of the whole.
+    fn lifted(&self, members: &[usize], certificate: Certificate) -> Certificate;
+}
+
+/// That of some `contacts` said of all: `given` are the places, among so many rows, of the rows that are no [`friction_rows`].
+fn lifted<L: DiskLaw<D>, const D: usize>(
+    laws: &[L],
+    contacts: &[usize],
+    (given, rows): (&[usize], usize),
+    certificate: Certificate,
+) -> Certificate {
+    match certificate {
+        Certificate::Impulses(Impulses { r, lambda }) => {
+            let mut all = vec![0.0; D * laws.len()];
+            for (r, &c) in r.chunks(D).zip(contacts) {
+                all[D * c..D * c + D].copy_from_slice(r);
+            }
+            Certificate::Impulses(Impulses { r: all, lambda })
+        }
+        Certificate::Separating { vectors } => {
+            let whole = friction_rows::<L, D>(laws.iter().copied());
+            let own = friction_rows::<L, D>(contacts.iter().map(|&c| laws[c]));
+            let place = |&[c, k]: &[usize; 2]| whole.binary_search(&[contacts[c], k]);
+            let of_friction = own.iter().filter_map(|row| Some(rows + place(row).ok()?));
+            let places: Vec<usize> = given.iter().copied().chain(of_friction).collect();
+            let lift = |vector: ExactVector| {
+                let mut all = vec![Exact::ZERO; rows + whole.len()];
+                places.iter().zip(vector.0).for_each(|(&place, y)| all[place] = y);
+                ExactVector(all)
+            };
+            Certificate::Separating { vectors: vectors.into_iter().map(lift).collect() }
+        }
+        other => other,
+    }
+}
+
+/// The coefficients of rolling friction of these contacts.
+fn rolling_of<R: RollingData>(all: &R, contacts: &[usize]) -> R {
+    R::of(contacts.iter().filter_map(|&c| all.values().get(c).copied()).collect())
+}
+
+/// The rows of these contacts, the first of all being `first`.
+fn rows_of<const D: usize>(
+    first: usize,
+    contacts: &[usize],
+) -> impl Iterator<Item = usize> + Clone + '_ {
+    contacts.iter().flat_map(move |&c| first + D * c..first + D * (c + 1))
+}
+
+/// The components of these contacts, of all.
+fn of_contacts<const D: usize>(all: &[f64], contacts: &[usize], own: &mut Vec<f64>) {
+    own.clear();
+    own.extend(contacts.iter().flat_map(|&c| small::block::<D>(all, c)));
+}
+
+/// The values at these places, of all or of none.
+fn of_each(all: &[f64], places: impl Iterator<Item = usize>, own: &mut Vec<f64>) {
+    own.clear();
+    own.extend(places.filter_map(|place| all.get(place).copied()));
 }
 
 /// The impulses of the rows that are held, zero of the others, and the places of the latter.

@@ -75,6 +75,10 @@ impl<P: Problem> Problem for Regularised<P> {
         self.base.origin()
     }
 
+    fn validate(&self) -> Result<(), ProblemError> {
+        self.base.validate()
+    }
+
     fn validate_point(&self, point: &Self::Point) -> Result<(), ProblemError> {
         self.base.validate_point(point)
     }

@@ -231,6 +231,16 @@ impl<L: DiskLaw<D>, const D: usize, S: LocalSolver<D, L>> Sweep<L, D, S> {
         self.contacts.iter().map(of).fold(0.0, f64::max)
     }
 
+    /// The square of each contact's natural residual, `‖w_c r_c − P_K(w_c r_c − ũ_c)‖²`, at r, whose velocities are u.
+    pub fn squares(&self, u: &[f64], r: &[f64], squares: &mut Vec<f64>) {
+        squares.clear();
+        squares.resize(self.contacts.len(), 0.0);
+        for contact in &self.contacts {
+            let (u, r) = (small::block::<D>(u, contact.place), small::block(r, contact.place));
+            squares[contact.place] = natural_residual(contact.unit, &r, &u, contact.law);
+        }
+    }
+
     /// The natural residual `‖( w_c r_c − P_K(w_c r_c − ũ_c) )_c‖` at r, whose velocities are u.
     pub fn residual(&self, u: &[f64], r: &[f64]) -> f64 {
         let mut sum = 0.0;

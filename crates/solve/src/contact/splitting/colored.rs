@@ -131,6 +131,8 @@ pub struct ColoredWork<P: Concurrent<D>, L: LocalSolver<D, P::Law>, const D: usi
     units: Vec<f64>,
     circles: Circles,
     by_color: Vec<Vec<u32>>,
+    /// The last sweep moved nothing.
+    still: bool,
 }
 
 /// A part of every colour's contacts, and the answers to the present colour's visits.
@@ -185,6 +187,7 @@ where
             units: vec![],
             circles: Circles::default(),
             by_color: vec![],
+            still: false,
             team,
         };
         self.fill(problem, &mut work);
@@ -200,6 +203,7 @@ where
     fn start(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) {
         problem.enter(&mut work.state, point);
         work.circles.restart(self.settings.omega, self.settings.omega_min);
+        work.still = false;
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -215,8 +219,8 @@ where
             let answer = contact.answer(&self.local, &u, &old, omega);
             moves.take(problem, (&mut *r, &mut work.state), *c, &answer);
         }
-        if !moves.any {
-            // Every later sweep would repeat this one.
+        if std::mem::replace(&mut work.still, !moves.any) && !moves.any {
+            // Every later sweep would repeat this one, with velocities that the judge's look has renewed.
             return Step::Done;
         }
         let estimate = moves.sum.sqrt();

@@ -240,6 +240,8 @@ pub struct SweepsWork<P: Blockwise<D>, L: LocalSolver<D, P::Law>, const D: usize
     accelerator: Accelerator,
     /// Sweeps since the last extrapolation.
     since: usize,
+    /// The last sweep moved nothing.
+    still: bool,
 }
 
 impl<const D: usize, P, L> Solver<P> for Sweeps<L, D>
@@ -260,6 +262,7 @@ where
             circles: Circles::default(),
             accelerator: Accelerator::new(self.settings.anderson, D * n),
             since: 0,
+            still: false,
         };
         self.fill(problem, &mut work);
         Ok(work)
@@ -277,7 +280,7 @@ where
         work.mean_move = 0.0;
         work.circles.restart(self.settings.omega, self.settings.omega_min);
         work.accelerator.forget();
-        work.since = 0;
+        (work.since, work.still) = (0, false);
     }
 
     fn step(&self, problem: &P, point: &mut P::Point, work: &mut Self::Work) -> Step {
@@ -332,8 +335,9 @@ where
         moves += of_rows / problem.velocity_scale(state).powi(2);
         *mean_move = moves / contacts.len() as f64;
         let repeats = freeze_after == 0 && self.settings.ordering == Ordering::Given;
-        if still && repeats && tolerance == 0.0 {
-            // Every later sweep would repeat this one.
+        let still = still && repeats && tolerance == 0.0;
+        if std::mem::replace(&mut work.still, still) && still {
+            // Every later sweep would repeat this one. A single one that moves nothing may have seen velocities with the rounding of a start that was far larger; the judge's look renews them.
             return Step::Done;
         }
         let estimate = moves.sqrt();

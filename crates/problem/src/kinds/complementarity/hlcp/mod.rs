@@ -77,6 +77,10 @@ impl Problem for Hlcp {
         HlcpPoint { x: vec![0.0; self.dim()], s: vec![0.0; self.dim()] }
     }
 
+    fn validate(&self) -> Result<(), ProblemError> {
+        Self::validate(self)
+    }
+
     fn validate_point(&self, point: &HlcpPoint) -> Result<(), ProblemError> {
         vector("x", &point.x, self.dim(), "pairs")?;
         vector("s", &point.s, self.dim(), "pairs")

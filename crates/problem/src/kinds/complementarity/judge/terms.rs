@@ -20,6 +20,8 @@ const LEVEL: f64 = 0.9;
 const STEPS: i32 = 60;
 /// Then in longer steps, down to the smallest numbers and up to the largest, of which the last two are near each other; where a size rises along one of them, in short ones again.
 const LONGER_STEPS: [i32; 9] = [64, 72, 88, 120, 184, 312, 568, 1016, 1020];
+/// Where F ends on the way, so many points halve the way to there.
+pub(crate) const EDGE: usize = 40;
 /// Changes of the variables, in parts of their size, along which a Jacobian is held against F. So far at least is a point from a solution that its own distance from a pole makes seem near:
 /// of `3 − 1/(x − 1)` close to 1, a change of x by as little as that distance changes F by all that it is.
 const STEP: f64 = 1.0 / 1024.0;
@@ -133,6 +135,15 @@ impl Terms {
     }
 }
 
+/// Takes the sizes for units that lie level, or rise, from one point to the next.
+fn note_level(least: &mut [f64], before: &[f64], now: &[f64]) {
+    for ((least, before), now) in least.iter_mut().zip(before).zip(now) {
+        if *now >= LEVEL * before && *before > 0.0 {
+            *least = least.min(now.max(*before));
+        }
+    }
+}
+
 /// `Σ_j of(J_ij d_j)`
 fn along(pattern: &Pattern, jacobian: &[f64], i: usize, d: &[f64], of: impl Fn(f64) -> f64) -> f64 {
     let terms = jacobian[pattern.range(i)].iter().zip(pattern.row(i));
@@ -236,8 +247,8 @@ impl Units {
                 continue;
             }
             let mut before = whole.clone();
-            let mut sizes_at = |k: i32| {
-                let part = 2.0_f64.powi(-sign * k);
+            let mut sizes_at = |k: i32, beyond: f64| {
+                let part = 2.0_f64.powi(-sign * k) * beyond;
                 let point: Vec<f64> =
                     from.iter().zip(&start).map(|(z, s)| z + part * (s - z)).collect();
                 let asked = !budget::over()
@@ -247,25 +258,41 @@ impl Units {
                 asked.then(|| [&terms.sizes[..], &[largest]].concat())
             };
             let short = (1..=STEPS / 2).map(|k| 2 * k);
-            let mut last = 0;
+            let (mut last, mut edge) = (0, None);
             for k in short.chain(LONGER_STEPS) {
-                let Some(now) = sizes_at(k) else { break };
+                let Some(now) = sizes_at(k, 1.0) else {
+                    edge = Some((last, f64::from(last - k).exp2()));
+                    break;
+                };
                 // Between the two there may be a size that is a unit, and smaller than those that are known.
                 let least_of = least.iter().zip(&whole).map(|(least, d)| least.min(VANISHING * d));
                 let mut rows = now.iter().zip(&before).zip(least_of);
                 let rises = rows.any(|((now, before), least)| {
                     *before > 0.0 && *now > 2.0 * before && *before < least
                 });
-                let between = (last + 2..k).step_by(2).filter(|_| rises).filter_map(&mut sizes_at);
+                let between = (last + 2..k).step_by(2).filter(|_| rises);
+                let between = between.filter_map(|k| sizes_at(k, 1.0));
                 for now in between.chain([now]) {
-                    for ((least, before), now) in least.iter_mut().zip(&before).zip(&now) {
-                        if *now >= LEVEL * before && *before > 0.0 {
-                            *least = least.min(now.max(*before));
-                        }
-                    }
+                    note_level(&mut least, &before, &now);
                     before = now;
                 }
                 last = k;
+            }
+            // F ends there: sizes may be level at the edge of where it is defined.
+            if let Some((last, mut outside)) = edge
+                && inwards
+            {
+                let mut inside = 1.0;
+                for _ in 0..EDGE {
+                    let middle = 0.5 * (inside + outside);
+                    match sizes_at(last, middle) {
+                        Some(now) => {
+                            note_level(&mut least, &before, &now);
+                            (before, inside) = (now, middle);
+                        }
+                        None => outside = middle,
+                    }
+                }
             }
         }
         // These are no sizes of the point last looked at any more.

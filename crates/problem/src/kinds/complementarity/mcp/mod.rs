@@ -18,7 +18,7 @@ use crate::check::{
     weigh,
 };
 use crate::error::{bounds, vector};
-use crate::field::{Expressions, Field, linear, same};
+use crate::field::{Expressions, Field, fits, linear, same};
 use crate::{Kind, OfAny, Problem, ProblemError};
 
 /// `l ≤ x ≤ u ⟂ F(x)`: `F_i(x) ≥ 0` where `x_i = l_i`, `F_i(x) ≤ 0` where `x_i = u_i`, and `F_i(x) = 0` between; that is
@@ -91,6 +91,7 @@ impl Mcp {
         if n == 0 {
             return Err(ProblemError::shape("F", "at least one row", "none"));
         }
+        fits(&*self.F)?;
         vector("start", &self.start, n, "rows of F")?;
         bounds([&self.lower, &self.upper], n, "rows of F")
     }
@@ -143,6 +144,10 @@ impl Problem for Mcp {
     fn origin(&self) -> LcpPoint {
         let projected = self.start.iter().enumerate().map(|(i, &x)| self.project(i, x));
         LcpPoint { z: projected.collect() }
+    }
+
+    fn validate(&self) -> Result<(), ProblemError> {
+        Self::validate(self)
     }
 
     fn validate_point(&self, point: &LcpPoint) -> Result<(), ProblemError> {

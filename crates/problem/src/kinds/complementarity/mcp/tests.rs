@@ -277,6 +277,34 @@ fn far_bounds_and_extreme_starts_make_no_error_small() {
     }
 }
 
+/// Nor a start far off where F ends on the way to zero: its rows are as large as they are up to there.
+#[test]
+fn where_f_ends_no_error_is_small() {
+    let inf = f64::INFINITY;
+    for (f, start, all) in [
+        ("(x - 1)^2.5*log(x - 1) + 1", 1e5, [1.634, 1.001]),
+        ("(x - 1)^2.5 + 1", 1e5, [1.0, 1.2]),
+        ("sqrt(x - 1)*x^2 + 0.5", 1e6, [1.0, 1.0 + 1e-9]),
+        ("exp(sqrt(x - 1)) - 0.9", 1600.0, [1.0, 1.0 + 1e-12]),
+        ("(1e-3 - x)^2.5 + 1e-7", -1e5, [1e-3, 0.999e-3]),
+    ] {
+        let field = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
+        let problem = Mcp::new(field, vec![-inf], vec![inf], vec![start]).unwrap();
+        for x in all {
+            let point = LcpPoint { z: vec![x] };
+            assert!(!problem.judge(&point, 1e-8).unwrap().solved, "{f} at {x}");
+        }
+    }
+    let f = |x: f64| if x < 1.0 { f64::NAN } else { (x - 1.0).powf(2.5) + 1.0 };
+    let field = closures(f, |x| 2.5 * (x - 1.0).powf(1.5));
+    let problem = Mcp::new(field, vec![-inf; 2], vec![inf; 2], vec![1e5; 2]).unwrap();
+    assert!(!problem.judge(&LcpPoint { z: vec![1.0; 2] }, 1e-8).unwrap().solved);
+    // Where there is a solution it passes.
+    let field = Expressions::parse(&["sqrt(x - 1) - 1e-3".into()], &["x".into()]).unwrap();
+    let problem = Mcp::new(field, vec![-inf], vec![inf], vec![1e5]).unwrap();
+    assert!(problem.judge(&LcpPoint { z: vec![1.0 + 1e-6] }, 1e-8).unwrap().solved);
+}
+
 #[test]
 fn a_point_is_asked_once() {
     use std::sync::Arc;

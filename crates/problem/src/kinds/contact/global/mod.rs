@@ -207,6 +207,10 @@ impl<const D: usize, L: Law<D>> Problem for FrictionGlobal<D, L> {
         }
     }
 
+    fn validate(&self) -> Result<(), ProblemError> {
+        Self::validate(self)
+    }
+
     fn validate_point(&self, point: &GlobalPoint) -> Result<(), ProblemError> {
         vector("v", &point.v, self.dofs(), "degrees of freedom")?;
         vector("r", &point.r, D * self.contacts(), "components of the contacts")?;

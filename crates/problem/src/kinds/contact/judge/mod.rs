@@ -11,4 +11,5 @@ pub(super) mod weighed;
 pub use contact::{ContactStatus, Law, Motion};
 pub use impulses::Impulses;
 pub(super) use impulses::holds;
+pub use statement::friction_rows;
 pub use weighed::Weighed;

@@ -4,6 +4,16 @@ use crate::check::proof::{exact, just};
 use crate::check::{Column, ConeSystem, Exact, Law};
 use nonsmooth_linalg::Csc;
 
+/// The rows of friction of the [`ConeSystem`] of these contacts, which come after all others: contact c and component k of each `σ⁺ + σ⁻ = 2 mu r_N`.
+pub fn friction_rows<L: Law<D>, const D: usize>(laws: impl Iterator<Item = L>) -> Vec<[usize; 2]> {
+    let rows_of_disk = (D - 1) / L::DISKS;
+    let of = |(c, law): (usize, L)| {
+        let has_one = move |k: &usize| law.coefficient((k - 1) / rows_of_disk) != 0.0;
+        (1..D).filter(has_one).map(move |k| [c, k])
+    };
+    laws.enumerate().flat_map(of).collect()
+}
+
 /// The impulses and velocities of contacts: columns of r as given, in the rows that begin with `first` the velocities u.
 ///
 /// The law in the plane: `0 ≤ u_N ⟂ r_N ≥ 0`, `u_T = a − b`, `0 ≤ a ⟂ mu r_N + r_T ≥ 0`, `0 ≤ b ⟂ mu r_N − r_T ≥ 0`: r_T < mu r_N where it moves

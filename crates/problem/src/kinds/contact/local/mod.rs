@@ -161,6 +161,11 @@ impl<const D: usize, L: Law<D>> FrictionLocal<D, L> {
         }
         for i in 0..nc {
             let (cols, blocks) = self.W.row(i);
+            let astray = |k: &usize| cols[*k] as usize >= nc || *k > 0 && cols[*k] <= cols[*k - 1];
+            if let Some(k) = (0..cols.len()).find(astray) {
+                let expected = format!("columns of blocks that ascend, below {nc}");
+                return Err(ProblemError::value(format!("W, block row {i}"), expected, cols[k]));
+            }
             for (&j, b) in cols.iter().zip(blocks) {
                 if let Some(k) = b.iter().flatten().position(|x| !x.is_finite()) {
                     let (row, column) = (D * i + k / D, D * j as usize + k % D);
@@ -209,6 +214,10 @@ impl<const D: usize, L: Law<D>> Problem for FrictionLocal<D, L> {
 
     fn origin(&self) -> LocalPoint {
         LocalPoint { r: vec![0.0; D * self.contacts()], lambda: vec![0.0; self.multipliers()] }
+    }
+
+    fn validate(&self) -> Result<(), ProblemError> {
+        Self::validate(self)
     }
 
     fn validate_point(&self, point: &LocalPoint) -> Result<(), ProblemError> {

@@ -2,6 +2,7 @@
 
 mod projection;
 
+use nonsmooth_linalg::budget;
 use serde::Serialize;
 
 use super::{Set, Vi};
@@ -9,7 +10,7 @@ use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
 use crate::field::tentatively;
-use crate::kinds::complementarity::judge::{Terms, Units, lesser, natural};
+use crate::kinds::complementarity::judge::{EDGE, Terms, Units, lesser, natural};
 pub(super) use projection::Projection;
 
 /// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
@@ -193,20 +194,42 @@ impl ViGauge {
         let at_zero = problem.F.expressions().is_some() || *size_of_start == 0.0;
         let parts = NEAR.map(|k| 2.0_f64.powi(-k));
         let parts = if at_zero { &[0.0][..] } else { &parts };
-        let mut found = Length::Unknown;
-        for part in parts {
+        let mut length_at = |part: f64| {
             let near: Vec<f64> = start.iter().map(|s| part * s).collect();
-            if !tentatively(|| terms.look(pattern, &near, false)) || !terms.smooth {
-                break;
+            if budget::over() || !tentatively(|| terms.look(pattern, &near, false)) || !terms.smooth
+            {
+                return None;
             }
-            let length = terms.sizes.iter().enumerate().fold(0.0_f64, |length, (i, d)| {
+            Some(terms.sizes.iter().enumerate().fold(0.0_f64, |length, (i, d)| {
                 let slope = largest(&terms.jacobian[pattern.range(i)]);
                 if slope > 0.0 { length.max(d / slope) } else { length }
-            });
+            }))
+        };
+        let mut found = Length::Unknown;
+        for &part in parts {
+            let Some(length) = length_at(part) else { break };
             let falls = !matches!(found, Length::Known(before) if length >= 0.5 * before);
             found = Length::Known(length);
             if !falls {
                 break;
+            }
+        }
+        if found == Length::Unknown {
+            // F ends on the way to zero: the least length as far as it is defined.
+            let (mut outside, mut inside) = (0.0, 1.0);
+            for _ in 0..EDGE {
+                let middle = 0.5 * (inside + outside);
+                match length_at(middle) {
+                    Some(length) => {
+                        inside = middle;
+                        let least = match found {
+                            Length::Known(least) => least.min(length),
+                            _ => length,
+                        };
+                        found = Length::Known(least);
+                    }
+                    None => outside = middle,
+                }
             }
         }
         found

@@ -47,21 +47,27 @@ impl Iterate {
             self.x[i] = model.project(i, *x);
         }
         self.start.copy_from_slice(&self.x);
-        for distance in INSIDE {
-            if model.linearise(&self.x, &mut self.f) {
-                model.weigh(&self.x, &self.f);
+        let mut defined = model.linearise(&self.x, &mut self.f);
+        for (distance, sign) in INSIDE.into_iter().flat_map(|d| [(d, 1.0), (d, -1.0)]) {
+            if defined {
                 break;
             }
             for i in 0..self.x.len() {
                 let (l, u) = model.bounds(i);
                 let d = distance.min(0.5 * (u - l));
                 if d > 0.0 {
-                    // Free variables that are zero are moved, too: of a root or a quotient.
+                    // Free variables that are zero are moved, too, up or down: of a root or a quotient.
                     let free = l.is_infinite() && u.is_infinite();
                     let x = self.start[i];
-                    self.x[i] = if free && x == 0.0 { d } else { x.max(l + d).min(u - d) };
+                    self.x[i] = if free && x == 0.0 { sign * d } else { x.max(l + d).min(u - d) };
                 }
             }
+            defined = model.linearise(&self.x, &mut self.f);
+        }
+        if defined {
+            model.weigh(&self.x, &self.f);
+        } else {
+            self.x.copy_from_slice(&self.start);
         }
         self.start.copy_from_slice(&self.x);
         (self.least, self.residual) = (f64::INFINITY, f64::INFINITY);
