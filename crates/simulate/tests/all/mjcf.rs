@@ -377,10 +377,6 @@ fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
             "<pair> (line 5): expected a geom that touches by its bits as `geom1`",
         ),
         (
-            two("<geom size='.5'/>").replace("name='c'", "name='c' gravcomp='1'") + "</mujoco>",
-            "<body> `a` (line 2): expected one `gravcomp` of all that moves as one body",
-        ),
-        (
             two("<geom name='s' size='.5' mass='-1'/>") + "</mujoco>",
             "<geom> `s` (line 3): expected a mass of at least 0, found -1",
         ),
@@ -398,6 +394,9 @@ fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
     // A body that excludes as a whole, and a pair that touches without saying so, are neither.
     let made = import(&(two("<site/>") + &excluded.replace("'c'", "'a'")));
     assert!(!said(&made, "exclude"), "{:?}", made.warnings);
+    let lifted = two("<geom size='.5'/>").replace("name='c'", "name='c' gravcomp='1'");
+    let made = import(&(lifted + "</mujoco>"));
+    assert!(said(&made, "<body> `a` (line 2): `gravcomp` of a part"), "{:?}", made.warnings);
     let made = import(&(two(solid) + excluded));
     assert!(
         said(&made, "<exclude> (line 5): of `c` all that moves with it is excluded, too"),

@@ -46,6 +46,12 @@ pub fn mjcf(text: &str, folder: &Path) -> Result<Imported, SimulateError> {
     let contacts = Contacts::read(&root, &defaults, &mut tree)?;
     let mut bodies = vec![];
     for k in 0..tree.bodies.len() {
+        if lifts_unevenly(&tree, k)? {
+            let key = tree.bodies[k].item.key();
+            tree.said.push(format!(
+                "{key}: `gravcomp` of a part of what moves as one body lifts its mass centre; the moment is left out"
+            ));
+        }
         if let Some(mut body) = body(&tree, &compiler, &contacts, k)? {
             contacts.of(k, &mut body);
             bodies.push(body);
@@ -114,6 +120,20 @@ fn keyframe(
     Ok(item.numbers("ctrl")?.unwrap_or_default())
 }
 
+/// Whether parts with a mass of what moves with body k have several `gravcomp`.
+fn lifts_unevenly(tree: &Tree, k: usize) -> Result<bool, SimulateError> {
+    if k == 0 || tree.carrier(k) != k {
+        return Ok(false);
+    }
+    let mut lifts = vec![];
+    for (i, body) in tree.bodies.iter().enumerate().filter(|(i, _)| tree.carrier(*i) == k) {
+        if tree.bodies[i].masses.iter().any(|m| m.mass > 0.0) {
+            lifts.push(body.item.real("gravcomp", 0.0)?);
+        }
+    }
+    Ok(lifts.iter().any(|lift| *lift != lifts[0]))
+}
+
 /// A body of the scene: one that moves with all that does not move against it, or one that stands and is touched.
 fn body(
     tree: &Tree,
@@ -140,20 +160,12 @@ fn body(
     } else {
         let mut masses: Vec<MassProperties> = vec![];
         let mut force = [0.0; 3];
-        let mut lifts: Vec<f64> = vec![];
         for &i in &members {
             let inner = frame.back().then(&tree.bodies[i].at);
             masses.extend(tree.bodies[i].masses.iter().map(|m| inner.mass(m)));
             let lift = tree.bodies[i].item.real("gravcomp", 0.0)?;
             let mass: f64 = tree.bodies[i].masses.iter().map(|m| m.mass).sum();
             force = sub(force, scale(lift * mass, compiler.gravity));
-            if mass > 0.0 {
-                lifts.push(lift);
-            }
-        }
-        if let Some(other) = lifts.iter().find(|lift| **lift != lifts[0]) {
-            let found = format!("{} and {other}, whose lift has a moment", lifts[0]);
-            return Err(own.item.wrong("one `gravcomp` of all that moves as one body", found));
         }
         let joined = MassProperties::joined(&masses);
         if masses.is_empty() || joined.mass.is_nan() || joined.mass <= 0.0 {
