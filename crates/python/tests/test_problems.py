@@ -357,3 +357,13 @@ def test_parts_of_answers_stay_as_they_are():
     assert type(answer.contacts["r_n"]) is np.ndarray
     with pytest.raises(AttributeError, match="contacts: expected a problem of contacts, found lcp"):
         ns.solve(ns.LCP(spd(3), -np.ones(3))).contacts
+
+
+def test_velocities_that_are_not_given_follow_from_the_impulses(tmp_path):
+    problem = ns.Friction(M=np.eye(3), H=np.eye(3), f=[-1.0, 0.9, 0.0], w=np.zeros(3), mu=[0.5])
+    answer = ns.solve(problem)
+    assert np.allclose(answer.v, [0.0, 0.4, 0.0])
+    assert problem.judge(answer.r)["solved"] and problem.judge({"r": answer.r})["solved"]
+    assert not problem.judge({"r": answer.r, "v": np.zeros(3)})["solved"]
+    problem.save(tmp_path / "slides.hdf5", answer.r)
+    assert np.allclose(ns.read(tmp_path / "slides.hdf5").solution["v"], answer.v)

@@ -5,7 +5,7 @@
 //! Method: where no island has nearly all contacts, each that a few sweeps over all have not solved is solved by itself, by all stages of `auto`, from the impulses that it has: what is hard in one
 //! costs nothing in the others, and what comes to rest is not held up by what slides. If one has no solution, neither has the whole. The natural map of the whole is made of theirs, so that islands with `e_i ≤ τ max(‖q_i‖, ‖q‖/√k)/√2`
 //! have `√(Σ e_i²) ≤ τ‖q‖`. Where the judge of all does not agree, as of a contact whose own loads are small, islands are asked for a tenth, and by the judge.
-//! On 52 problems of the corpus that fall apart this takes .65 of the time (.15 to 1.8), on those of capsules a half to a sixth.
+//! On 52 local problems of the corpus that fall apart this takes .57 of the time (.14 to 1.6), on those of capsules a half to a seventh.
 //!
 //! Cost: a union-find over the couplings; then what the islands cost, a problem and a workspace for each of the first sixteen and one for the others. Fails: where an island does, or leaves in doubt whether it has a solution; after the others the stages go on with the whole.
 

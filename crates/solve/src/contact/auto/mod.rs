@@ -7,7 +7,7 @@
 //! 1. **Sweeps**: exact Gauss–Seidel for as long as its rate of convergence promises the tolerance sooner than a few
 //!    factorisations would, and after stage 2 until they have cost one. Many problems end here. Between them, here and in stage 6, the contacts that
 //!    still move are followed where they are few ([`Sweep::follow`]), or the sweeps are accelerated, where a trial shows that it helps: one by one from the fifth on
-//!    ([`EarlyAcceleration`]), else ten at a time after thirty ([`Acceleration`]). A problem that falls apart into islands is solved island by island after a few of them (`apart.rs`).
+//!    ([`EarlyAcceleration`]), else ten at a time after thirty ([`Acceleration`]). A problem that falls apart into islands is solved island by island after a few of them, one that is stated by its bodies when they are left (`apart.rs`).
 //! 2. **Rest** (`parts/alternating.rs`): impulses within the cones that leave nothing moving, where the sweeps show nothing that flies apart: after five of them where they
 //!    still move much, else after the others. One factorisation and a few solves end structures at rest, whatever their height; two solves tell where nothing comes of it. Where contacts
 //!    open because weights have yet to come down to them, as in walls with head joints, it comes at once where they open slowly, when the sweeps have cost a factorisation where they open fast.
@@ -550,7 +550,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
             let swept = work.done.sweeps;
             if (GLANCE..GLANCE + together).contains(&swept)
-                && (self.falls_apart(problem, point, work, estimate)
+                && (problem.bodies().is_none() && self.falls_apart(problem, point, work, estimate)
                     || self.rests_at_a_glance(problem, point, work, estimate))
             {
                 return Step::Continue { estimate };
@@ -586,7 +586,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         let promising =
             if with != without && starts::has_spread(problem, work) { with } else { without }
                 || work.rest != RestSearch::Open && self.sweeps_are_cheap(work, costs);
-        if !promising && !self.goes_back(problem, point, work) {
+        // By its bodies an island costs a factorisation to state: only where sweeps are left.
+        let stays = promising || self.goes_back(problem, point, work);
+        if !stays && !self.falls_apart(problem, point, work, estimate) {
             self.leave_sweeps(problem, point, work);
         }
         Step::Continue { estimate }
