@@ -5,7 +5,7 @@ mod terms;
 
 pub use linear::LinearGauge;
 pub(super) use linear::{Data, InZ};
-pub(crate) use terms::{EDGE, Terms, Units};
+pub(crate) use terms::{Terms, Units, to_the_edge};
 
 use serde::Serialize;
 

@@ -21,7 +21,7 @@ const STEPS: i32 = 60;
 /// Then in longer steps, down to the smallest numbers and up to the largest, of which the last two are near each other; where a size rises along one of them, in short ones again.
 const LONGER_STEPS: [i32; 9] = [64, 72, 88, 120, 184, 312, 568, 1016, 1020];
 /// Where F ends on the way, so many points halve the way to there.
-pub(crate) const EDGE: usize = 40;
+const EDGE: usize = 40;
 /// Changes of the variables, in parts of their size, along which a Jacobian is held against F. So far at least is a point from a solution that its own distance from a pole makes seem near:
 /// of `3 − 1/(x − 1)` close to 1, a change of x by as little as that distance changes F by all that it is.
 const STEP: f64 = 1.0 / 1024.0;
@@ -132,6 +132,15 @@ impl Terms {
                     .min(f[i].abs() + seen.fold(0.0_f64, |most, change| most.max(change.abs())));
             }
         }
+    }
+}
+
+/// Halves the way from 1, where F is defined, to `outside`, where it is not; `look` says whether it is defined at a point of the way.
+pub(crate) fn to_the_edge(mut outside: f64, mut look: impl FnMut(f64) -> bool) {
+    let mut inside = 1.0;
+    for _ in 0..EDGE {
+        let middle = 0.5 * (inside + outside);
+        *(if look(middle) { &mut inside } else { &mut outside }) = middle;
     }
 }
 
@@ -279,20 +288,17 @@ impl Units {
                 last = k;
             }
             // F ends there: sizes may be level at the edge of where it is defined.
-            if let Some((last, mut outside)) = edge
+            if let Some((last, outside)) = edge
                 && inwards
             {
-                let mut inside = 1.0;
-                for _ in 0..EDGE {
-                    let middle = 0.5 * (inside + outside);
-                    match sizes_at(last, middle) {
-                        Some(now) => {
-                            note_level(&mut least, &before, &now);
-                            (before, inside) = (now, middle);
-                        }
-                        None => outside = middle,
-                    }
-                }
+                to_the_edge(outside, |part| {
+                    let now = sizes_at(last, part);
+                    now.is_some_and(|now| {
+                        note_level(&mut least, &before, &now);
+                        before = now;
+                        true
+                    })
+                });
             }
         }
         // These are no sizes of the point last looked at any more.

@@ -10,7 +10,7 @@ use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
 use crate::field::tentatively;
-use crate::kinds::complementarity::judge::{EDGE, Terms, Units, lesser, natural};
+use crate::kinds::complementarity::judge::{Terms, Units, lesser, natural, to_the_edge};
 pub(super) use projection::Projection;
 
 /// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
@@ -216,21 +216,17 @@ impl ViGauge {
         }
         if found == Length::Unknown {
             // F ends on the way to zero: the least length as far as it is defined.
-            let (mut outside, mut inside) = (0.0, 1.0);
-            for _ in 0..EDGE {
-                let middle = 0.5 * (inside + outside);
-                match length_at(middle) {
-                    Some(length) => {
-                        inside = middle;
-                        let least = match found {
-                            Length::Known(least) => least.min(length),
-                            _ => length,
-                        };
-                        found = Length::Known(least);
-                    }
-                    None => outside = middle,
-                }
-            }
+            to_the_edge(0.0, |part| {
+                let length = length_at(part);
+                length.is_some_and(|length| {
+                    let least = match found {
+                        Length::Known(least) => least.min(length),
+                        _ => length,
+                    };
+                    found = Length::Known(least);
+                    true
+                })
+            });
         }
         found
     }
