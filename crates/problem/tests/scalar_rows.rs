@@ -1,9 +1,11 @@
 //! Scalar rows with bounds: the judge on planted points, on points that break each part of the law, and in exact numbers.
 
-use nonsmooth_linalg::Csc;
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::check::{Evidence, Judged};
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{Bounds, FrictionGlobal, GlobalPoint, Problem, RowsGlobal};
+use nonsmooth_problem::{
+    Bounds, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, RowsGlobal, RowsLocal,
+};
 
 fn cases() -> impl Iterator<Item = Planted> {
     (0..12).map(|seed| Planted {
@@ -120,4 +122,45 @@ fn limits_that_contradict_each_other_are_refuted() {
     // A motor of limited strength cannot enforce anything.
     problem.rows.as_mut().unwrap().bounds.upper = vec![5.0; 2];
     assert!(matches!(problem.evidence(&farkas), Evidence::Nothing));
+}
+
+/// A light part that a motor holds, within its bounds, and that rides on a heavy one: `u = v_1 + v_2`, `M = diag(m, 1)`, `f = (1, −1)`. Without the motor the part alone would open the contact at 1/m;
+/// with it the heavy body falls at 1, which no such velocity makes small.
+#[test]
+fn no_contact_hides_behind_what_a_row_holds() {
+    for power in [-14, -27, -40] {
+        let m = 2f64.powi(power);
+        let h = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 0, 1.0)].into_iter()).unwrap();
+        let g = Csc::from_triplets(2, 1, [(0, 0, 1.0)].into_iter()).unwrap();
+        let mut global = FrictionGlobal::<2>::new(
+            Csc::diagonal(&[m, 1.0]),
+            h,
+            vec![1.0, -1.0],
+            vec![0.0; 2],
+            vec![0.0],
+        )
+        .unwrap();
+        let bounds = || Bounds { lower: vec![-4.0], upper: vec![4.0] };
+        global.rows = Some(RowsGlobal { G: g, b: vec![0.0], bounds: bounds() });
+        let w = Csc::from_triplets(2, 2, [(0, 0, 1.0 / m + 1.0)].into_iter()).unwrap();
+        let q = vec![1.0 / m - 1.0, 0.0];
+        let mut local = FrictionLocal::<2>::new(Bsr::from_csc(&w), q, vec![0.0]).unwrap();
+        let v = Csc::from_triplets(2, 1, [(0, 0, 1.0 / m)].into_iter()).unwrap();
+        let r = Csc::diagonal(&[1.0 / m]);
+        local.rows = Some(RowsLocal { V: v, R: r, s: vec![1.0 / m], bounds: bounds() });
+        let of = |r: f64| {
+            let point =
+                GlobalPoint { v: vec![0.0, r - 1.0], r: vec![r, 0.0], lambda: vec![-1.0 - r] };
+            let global = global.judge(&point, 1e-8).unwrap();
+            let point = LocalPoint { r: point.r, lambda: point.lambda };
+            [global, local.judge(&point, 1e-8).unwrap()]
+        };
+        for verdict in of(1.0) {
+            assert!(verdict.solved, "2^{power} {:?}", verdict.measure);
+        }
+        for verdict in of(0.0) {
+            assert!(!verdict.solved, "2^{power} {:?}", verdict.measure);
+            assert_eq!(verdict.velocity[0], -1.0);
+        }
+    }
 }

@@ -433,6 +433,34 @@ fn no_contact_hides_behind_a_larger_one() {
     }
 }
 
+/// Where `[W, V; Vᵀ, R]` is far from positive semidefinite, or far from symmetric, W_cc does not say what an impulse does.
+#[test]
+fn no_contact_hides_behind_a_small_block_of_its_own() {
+    for power in [-20, -40, -60] {
+        let e = 2f64.powi(power);
+        // The free row answers the impulse of the contact by a velocity of −r: r_N = −9 makes u_N = 8.
+        let w = Bsr::from_csc(&Csc::diagonal(&[e; 2]));
+        let v = Csc::from_triplets(2, 1, [(0, 0, 1.0)].into_iter()).unwrap();
+        let mut problem = FrictionLocal::<2>::new(w, vec![-1.0, 0.0], vec![0.0]).unwrap();
+        problem.rows = Some(RowsLocal::bilateral(v, Csc::diagonal(&[1.0]), vec![0.0]));
+        let verdict = problem.judge(&LocalPoint { r: vec![-9.0, 0.0], lambda: vec![9.0] }, 1e-8);
+        assert!(!verdict.unwrap().solved, "2^{power}");
+        // Two normals that turn each other round: r_N = 1 stops both, r_N = 683 neither.
+        let skew = [(0, 2, 1.0), (2, 0, -1.0)];
+        let entries = (0..4).map(|i| (i, i, e)).chain(skew);
+        let w = Bsr::from_csc(&Csc::from_triplets(4, 4, entries).unwrap());
+        let problem = FrictionLocal::<2>::new(w, vec![-1.0, 0.0, 1.0, 0.0], vec![0.5; 2]).unwrap();
+        let solved = |r: [f64; 2]| {
+            let point = LocalPoint { r: vec![r[0], 0.0, r[1], 0.0], lambda: vec![] };
+            problem.judge(&point, 1e-8).unwrap().solved
+        };
+        // u = (e r_1 + r_2 − 1, e r_2 − r_1 + 1)
+        let first = (1.0 + e) / (1.0 + e * e);
+        assert!(solved([first, 1.0 - e * first]), "2^{power}");
+        assert!(!solved([1.0, 683.0]), "2^{power}");
+    }
+}
+
 #[test]
 fn no_sliding_excuses_sinking_but_that_of_its_own_rounding() {
     // One contact that slides at 1 m/s, without impulses: it sinks by δ, all there is along its normal.

@@ -240,6 +240,20 @@ fn no_start_makes_the_errors_of_a_function_small() {
     }
 }
 
+/// No row of the set touches x_1 and x_2, of which one row of F is twenty thousand times as large as the other: x that runs away along its kernel solves nothing.
+#[test]
+fn variables_that_no_row_ties_are_judged_each_by_itself() {
+    let f = ["20000*x1+20000*x2", "x1+x2-1", "x3"].map(String::from);
+    let f = Expressions::parse(&f, &[]).unwrap();
+    let c = Csc::from_triplets(1, 3, [(0, 2, 1.0)].into_iter()).unwrap();
+    let set = Set::Polyhedron { A: Csc::zeros(0, 3), b: vec![], C: c, d: vec![1.0] };
+    let problem = Vi::new(f, set, vec![0.0; 3]).unwrap();
+    for far in [1e6, 1e12] {
+        let verdict = problem.judge(&LcpPoint { z: vec![-far, far, 1.0] }, 1e-8).unwrap();
+        assert!(!verdict.solved, "{far:e} {:?}", verdict.measure);
+    }
+}
+
 #[test]
 fn mistakes_are_named() {
     let field = || Expressions::parse(&["x1".into(), "x2".into()], &[]).unwrap();

@@ -284,7 +284,7 @@ impl GlobalGauge {
         point: &GlobalPoint,
         precisely: bool,
     ) -> Measure {
-        let Self { law, dynamics, reach, u, exact, own: state, buffer, rows, .. } = self;
+        let Self { law, dynamics, free, reach, u, exact, own: state, buffer, rows, .. } = self;
         let n = problem.dofs();
         // A size needs no more digits.
         rows.precisely(false);
@@ -314,6 +314,18 @@ impl GlobalGauge {
         };
         rows.start(&problem.w);
         rows.add_transposed(&problem.H, v);
+        let bounded = problem.rows.as_ref().filter(|b| !b.bounds.are_free());
+        if let (Some(b), Some((free, scratch))) = (bounded, free) {
+            rows.start(&problem.f);
+            rows.add(1.0, &b.G, lambda);
+            spare[..n].iter_mut().zip(rows.values()).for_each(|(x, f)| *x = f);
+            free.solve_with(&mut spare[..n], scratch, Refine::Once);
+            rows.start(&problem.w);
+            rows.add_transposed(&problem.H, &spare[..n]);
+            law.measure_at(rows.norm());
+            rows.start(&problem.w);
+            rows.add_transposed(&problem.H, v);
+        }
         let mut measure = if precisely {
             reach.update(problem, &law.w, &point.r, (v, lambda), &mut spare[..n]);
             rows.add_transposed(&problem.H, v_low);

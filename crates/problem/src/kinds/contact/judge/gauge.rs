@@ -57,13 +57,15 @@ pub(crate) const STEERING: Option<NoCare> = None;
 #[derive(Debug, Clone, Default)]
 pub(crate) struct LawGauge {
     pub(crate) w: Vec<f64>,
-    /// The largest modulus of W_cc, which is there where the trace is not; zero where nothing is. Others may follow.
+    /// The largest modulus of W_cc, which is there where the trace is not, or what a neighbour makes of an impulse; zero where nothing is. Others may follow.
     pub(crate) strength: Vec<f64>,
     pub(crate) loads: Loads,
     /// Moduli of loads, and room for as many.
     pub(crate) amounts: Vec<f64>,
     pub(crate) impulses: Vec<f64>,
     pub(crate) norm_q: f64,
+    /// Where scalar rows take part: the size of q with them in force, as far as it is known without a point, and that of all loads.
+    with_rows: Option<(f64, f64)>,
 }
 
 /// The part of the loads that q counts at least where scalar rows take up some of them.
@@ -78,6 +80,7 @@ impl LawGauge {
 
     pub(crate) fn refill(&mut self, diagonal: impl Iterator<Item = f64>, norm_q: f64) {
         self.norm_q = norm_q;
+        self.with_rows = None;
         self.w.clear();
         self.w.extend(diagonal);
         let mean = self.w.iter().sum::<f64>() / self.w.len().max(1) as f64;
@@ -94,10 +97,37 @@ impl LawGauge {
     pub(crate) fn measure_by(&mut self, enforced: Option<f64>) {
         let reaching = norm_of((0..self.w.len()).map(|c| self.loads.reaching(c)));
         let loads = self.norm_q.max(reaching);
-        if loads > 0.0 && loads.is_finite() {
-            let known = enforced.filter(|q| q.is_finite()).unwrap_or(self.norm_q);
-            self.norm_q = known.max(OF_LOADS * loads).min(loads);
+        let known = enforced.filter(|q| q.is_finite()).unwrap_or(self.norm_q);
+        self.with_rows = (loads > 0.0 && loads.is_finite()).then_some((known, loads));
+        self.measure_at(known);
+    }
+
+    /// The same at a point whose multipliers leave so much of q, if that is less: rows between their bounds are in force there, and without them a light part would make velocities behind which contacts hide.
+    pub(crate) fn measure_at(&mut self, left: f64) {
+        if let Some((known, loads)) = self.with_rows {
+            self.norm_q = known.min(left).max(OF_LOADS * loads).min(loads);
         }
+    }
+
+    /// Raises the strength of those to which a neighbour that answers does more than they do to themselves: `√(W_cc |W_cj W_jc| / W_jj)`, and `|W_cj W_jc| / W_jj` where row j is `held`, whatever the
+    /// units of both. `[W, V; Vᵀ, R]` that is positive semidefinite has none: `|W_cj|² ≤ W_cc W_jj`.
+    pub(crate) fn raise(
+        &mut self,
+        each: impl FnOnce(&mut dyn FnMut(usize, usize, f64, &dyn Fn() -> f64)),
+        held: impl Fn(usize) -> bool,
+    ) {
+        let Self { strength, impulses: own, .. } = self;
+        own.clear();
+        own.extend_from_slice(strength);
+        each(&mut |i, j, a, back| {
+            if a / own[i] * (a / own[j]) > 4.0 {
+                let through = a * (back() / own[j]);
+                let stands = if held(j) { through } else { (own[i] * through).sqrt() };
+                if stands.is_finite() {
+                    strength[i] = strength[i].max(stands);
+                }
+            }
+        });
     }
 
     /// What stands for w_c where contact c is measured by itself.

@@ -121,6 +121,33 @@ impl LocalGauge {
             !loads.are_joined()
         });
         loads.spread(amounts.iter().copied());
+        let nc = problem.contacts();
+        let held = |j: usize| {
+            j >= nc && problem.rows.as_ref().is_some_and(|rows| rows.bounds.is_free(j - nc))
+        };
+        self.law.raise(
+            |raise| {
+                all.each(|i, j, size| {
+                    raise(i, j, size(), &|| all.entry(j, i));
+                    true
+                });
+            },
+            held,
+        );
+    }
+
+    /// Measures by the size of `q + V λ` at the point where rows have bounds.
+    fn measure_at<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionLocal<D, L>,
+        lambda: &[f64],
+    ) {
+        let Some(rows) = problem.rows.as_ref().filter(|rows| !rows.bounds.are_free()) else {
+            return;
+        };
+        self.rows.start(&problem.q);
+        self.rows.add(1.0, &rows.V, lambda);
+        self.law.measure_at(self.rows.norm());
     }
 
     /// The residuals; `precisely` in doubled precision from the data to the last comparison.
@@ -131,6 +158,7 @@ impl LocalGauge {
         precisely: bool,
     ) -> Measure {
         self.rows.precisely(precisely);
+        self.measure_at(problem, &point.lambda);
         let mut measure = if precisely {
             self.update_velocity_precisely(problem, point);
             let Self { law, exact, sizes, terms, .. } = self;

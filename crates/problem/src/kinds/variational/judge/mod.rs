@@ -2,7 +2,7 @@
 
 mod projection;
 
-use nonsmooth_linalg::budget;
+use nonsmooth_linalg::{Groups, budget};
 use serde::Serialize;
 
 use super::{Set, Vi};
@@ -46,7 +46,7 @@ pub struct SetCounts {
 /// | `primal` | how far x violates a constraint: of a bound, a half-space, a ball the distance from it, of a cone `(‖x̄‖ − x_1)/√2`; the largest over ξ |
 /// | `dual`, `relative` | `‖r‖_∞ / ξ`, and what the projection violates added; **decides** |
 /// | `complementarity` | `|F(x)ᵀ r| / (n φ ξ)` |
-/// | `own` | the same residual of each part of the set (each variable of a box) by itself, with the φ of its rows at the start or at zero, the smaller: x that runs away, or larger rows, excuse nothing |
+/// | `own` | the same residual of each part of the set (each variable of a box, the variables that rows of a polyhedron join) by itself, with the φ of its rows at the start or at zero, the smaller: x that runs away, or larger rows, excuse nothing |
 /// | `absolute`, `literature`, `siconos` | `‖x − P_X(x − F(x))‖_∞` |
 ///
 /// The projections are the judge's own: of cones in the half-plane of the axis and the norm of the rest, of polyhedra by nonnegative least squares
@@ -63,6 +63,8 @@ pub struct ViGauge {
     kept: Vec<f64>,
     /// For γ = 1 and for the two others: the points to be projected are far from each other, the active rows too.
     projections: [Vec<Projection>; 3],
+    /// The variables that each part of the set ties to each other, counted from its first: those of a polyhedron that no chain of rows joins are projected each by itself.
+    tied: Vec<Vec<Vec<usize>>>,
     /// The projection of the start.
     start: Vec<f64>,
     /// The sizes of it and of the set, and the length that F has near zero.
@@ -148,6 +150,7 @@ impl ViGauge {
             kept: zeros(),
             projections: [0, 1, 2]
                 .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
+            tied: problem.set.parts().iter().map(|(_, set)| tied(set)).collect(),
             size_of_start: largest(&start),
             size_of_set: problem.set.size(),
             start,
@@ -260,8 +263,8 @@ impl ViGauge {
         largest(moved) + missed
     }
 
-    /// What F makes of x in the units of its rows that are known beforehand: `max ‖x − P_X(x − γ F)‖_∞ / ξ` over the parts of the set, with `γ = ξ/φ` of each part (of a box, each variable)
-    /// by its own φ, and ξ the size of the part's x, start and set, as far as they count; of parts without a unit nothing.
+    /// What F makes of x in the units of its rows that are known beforehand: `max ‖x − P_X(x − γ F)‖_∞ / ξ` over the parts of the set, with `γ = ξ/φ` of each part (of a box, each variable; of a polyhedron, those
+    /// that its rows join) by its own φ, and ξ the size of the part's x, start and set, as far as they count; of parts without a unit nothing.
     fn own(&mut self, problem: &Vi, x: &[f64]) -> f64 {
         let mut sizes = vec![0.0; x.len()];
         let (units, terms) = (&self.units, &self.terms);
@@ -274,15 +277,18 @@ impl ViGauge {
         let least = if known.size() > 0.0 { OF_OTHERS * known.size() } else { largest(x) };
         // Of a start far off a part counts.
         let share = if self.size_of_start > 0.0 { known.start / self.size_of_start } else { 1.0 };
-        for (first, set) in problem.set.parts() {
+        for ((first, set), tied) in problem.set.parts().into_iter().zip(&self.tied) {
             let whole = first..first + set.dim();
             let Set::Box { lower, upper } = set else {
-                let of = |x: &[f64]| largest(&x[whole.clone()]);
-                let stated = (share * of(&self.start)).max(set.size().min(known.set));
-                let size = stated.max(of(x)).max(least);
-                let phi = whole.clone().map(phi).fold(0.0, f64::max);
-                for i in whole {
-                    (sizes[i], self.gammas[i]) = scaled(size, phi);
+                for tied in tied {
+                    let these = || tied.iter().map(|i| first + i);
+                    let of = |x: &[f64]| these().fold(0.0_f64, |size, i| size.max(x[i].abs()));
+                    let stated = (share * of(&self.start)).max(set.size().min(known.set));
+                    let size = stated.max(of(x)).max(least);
+                    let phi = these().map(phi).fold(0.0, f64::max);
+                    for i in these() {
+                        (sizes[i], self.gammas[i]) = scaled(size, phi);
+                    }
                 }
                 continue;
             };
@@ -412,6 +418,25 @@ fn scaled(size: f64, phi: f64) -> (f64, f64) {
 
 fn largest(x: &[f64]) -> f64 {
     x.iter().fold(0.0, |size, x| size.max(x.abs()))
+}
+
+/// The groups of variables of a set that is no product, each of which it projects by itself.
+fn tied(set: &Set) -> Vec<Vec<usize>> {
+    match set {
+        // Looked at one by one.
+        Set::Box { .. } => vec![],
+        Set::Polyhedron { A, C, .. } => {
+            let mut groups = Groups::new(set.dim());
+            for rows in [A, C] {
+                let of_rows = rows.transpose();
+                for i in 0..of_rows.ncols() {
+                    groups.join_all(of_rows.column(i).0);
+                }
+            }
+            groups.members()
+        }
+        _ => vec![(0..set.dim()).collect()],
+    }
 }
 
 /// How far x violates a set that is no product.
