@@ -1,6 +1,7 @@
 //! `nonsmooth solve --all-solutions`: every solution of a small linear complementarity problem.
 
 use std::path::Path;
+use std::time::Instant;
 
 use nonsmooth_io::table::Table;
 use nonsmooth_io::{ProblemFile, StoredPoint};
@@ -15,6 +16,8 @@ use crate::{Exit, answer, files, output};
 
 /// Patterns of `z_i = 0` and `w_i = 0` with solutions that are listed at most.
 const MOST: usize = 1000;
+/// Ends, directions and lines of a family that a report has at most, of each.
+const SHOWN: usize = 20;
 
 /// Lists the solutions of the problem of a file. Isolated ones are judged at the tolerance of the limits.
 pub fn run(
@@ -29,7 +32,14 @@ pub fn run(
             linear @ (Complementarity::Lcp(_) | Complementarity::Mlcp(_)),
         ) => {
             let copy = linear.clone();
-            guard::run(limits, || {}, move |_| solutions(&copy))
+            guard::run(
+                limits,
+                || {},
+                move |own| {
+                    let _scope = own.budget(Instant::now()).enter();
+                    solutions(&copy)
+                },
+            )
         }
         other => {
             let (file, kind) = (file.display(), other.kind().name());
@@ -46,12 +56,20 @@ pub fn run(
     let listed = found.faces.iter().map(|face| Listed::new(content, face, tolerance));
     let listed =
         listed.collect::<Result<Vec<_>, _>>().map_err(|e| format!("{}: {e}", file.display()))?;
+    let passing = listed.iter().filter(|one| one.relative <= tolerance).count();
+    let mut lacks = found.lacks.clone();
+    if passing < listed.len() {
+        let failing = listed.len() - passing;
+        lacks.push(format!("{failing} of them, rounded to doubles, do not pass"));
+    }
     output::print(&match json {
-        true => as_json(file, problem, &found, &listed),
-        false => text(file, problem, &found, &listed, tolerance),
+        true => as_json(file, problem, &lacks, &listed),
+        false => {
+            let heading = format!("{}: {}\n", file.display(), summary(&found, &lacks));
+            text(heading, problem, &listed, tolerance)
+        }
     });
-    let passes = listed.iter().all(|one| one.relative <= tolerance);
-    Ok(Exit::solved(!listed.is_empty() && passes))
+    Ok(Exit::solved(!listed.is_empty() && passing == listed.len()))
 }
 
 fn solutions(problem: &Complementarity) -> Result<Solutions, SolveError> {
@@ -86,8 +104,8 @@ impl<'a> Listed<'a> {
     }
 }
 
-/// How many there are, and whether there may be more.
-fn summary(found: &Solutions) -> String {
+/// How many there are, and whether that is all.
+fn summary(found: &Solutions, lacks: &[String]) -> String {
     let (isolated, families) = (found.isolated().count(), found.families().count());
     let what = match (isolated, families) {
         (0, 0) => "no solution".into(),
@@ -97,26 +115,21 @@ fn summary(found: &Solutions) -> String {
         (n, 1) => format!("{} and 1 family", count(n, "isolated solution")),
         (n, k) => format!("{} and {k} families", count(n, "isolated solution")),
     };
-    match found.complete {
-        true => format!("{what}; there are no others"),
-        false => format!("{what}, and perhaps more: the list ends after {MOST} patterns"),
+    match (lacks, found.faces.is_empty()) {
+        ([], _) => format!("{what}; there are no others"),
+        (_, true) => format!("{what} found, but perhaps there are some: {}", lacks.join("; ")),
+        (_, false) => format!("{what}, and perhaps more: {}", lacks.join("; ")),
     }
 }
 
-fn text(
-    file: &Path,
-    problem: &AnyProblem,
-    found: &Solutions,
-    listed: &[Listed],
-    tolerance: f64,
-) -> String {
-    let mut text = format!("{}: {}\n", file.display(), summary(found));
+fn text(heading: String, problem: &AnyProblem, listed: &[Listed], tolerance: f64) -> String {
+    let mut text = heading;
     row(&mut text, "problem", report::problem_text(problem));
     for (k, one) in listed.iter().enumerate() {
         let label = format!("{}", k + 1);
         let what = match one.face.dimension {
             0 => "isolated".into(),
-            1 => "a segment or ray of solutions; one in its interior".into(),
+            1 => "a segment, ray or line of solutions; one in its interior".into(),
             d => format!("a family of dimension {d}; one in its interior"),
         };
         let passes = if one.relative <= tolerance { "" } else { ", does not pass" };
@@ -126,17 +139,21 @@ fn text(
             format!("{what} (relative residual {}{passes})", report::number(one.relative)),
         );
         answer::lines(&one.table).iter().for_each(|line| row(&mut text, "", line));
-        for (name, all) in [("end", &one.face.ends), ("direction", &one.face.rays)] {
-            for z in all {
+        let Face { ends, rays, lines, .. } = one.face;
+        for (name, all) in [("end", ends), ("direction", rays), ("line", lines)] {
+            for z in all.iter().take(SHOWN) {
                 let each: Vec<_> = z.iter().map(|&x| answer::short(x)).collect();
                 row(&mut text, "", format!("{name}: ({})", each.join(", ")));
+            }
+            if all.len() > SHOWN {
+                row(&mut text, "", format!("{name}: {} more, see --json", all.len() - SHOWN));
             }
         }
     }
     text
 }
 
-fn as_json(file: &Path, problem: &AnyProblem, found: &Solutions, listed: &[Listed]) -> String {
+fn as_json(file: &Path, problem: &AnyProblem, lacks: &[String], listed: &[Listed]) -> String {
     let mut all = report::problem_json(file, problem);
     let each = listed.iter().map(|one| {
         json!({
@@ -145,10 +162,14 @@ fn as_json(file: &Path, problem: &AnyProblem, found: &Solutions, listed: &[Liste
             "dimension": one.face.dimension,
             "ends": one.face.ends,
             "rays": one.face.rays,
+            "lines": one.face.lines,
             "relative": one.relative,
         })
     });
     let each = each.collect::<Vec<_>>();
-    all.extend(report::fields(json!({"complete": found.complete, "solutions": each})));
+    all.extend(report::fields(json!({"complete": lacks.is_empty(), "solutions": each})));
+    if !lacks.is_empty() {
+        all.extend(report::fields(json!({"lacks": lacks})));
+    }
     format!("{}\n", json!(all))
 }

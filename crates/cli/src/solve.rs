@@ -61,7 +61,10 @@ pub struct Args {
     #[arg(long)]
     solution: bool,
     /// List every solution of an LCP or MLCP of at most 40 pairs, isolated ones and families, by enumeration of the complementary
-    /// cones; with more than some 20 pairs this may take long (--time-limit)
+    /// cones; with more than some 20 pairs this may take long (--time-limit). `there are no others` is said where exact arithmetic has shown it, else
+    /// what is not known. A family is all mixtures of its ends, plus nonnegative multiples of its directions, plus any multiples of its lines. With --json:
+    /// `complete` (no others), else `lacks` (what is not known), and `solutions`, each with `z` (of a family one in its interior), `w`, `dimension`, `ends`, `rays` (the
+    /// directions), `lines` and `relative` (the residual of z)
     #[arg(long, conflicts_with_all = ["solver", "settings", "warm_start", "out", "plot", "trace", "certificate", "max_iter"])]
     all_solutions: bool,
     /// Begin at the start of a nonlinear problem and at random points, so many in all, and list the solutions that differ

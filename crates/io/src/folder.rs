@@ -49,6 +49,8 @@ pub(crate) struct Used<'a> {
     pub entries: u64,
     /// What says so.
     pub why: &'a str,
+    /// How many entries there are where there are more; any number without it.
+    pub room: Option<i64>,
 }
 
 /// A group of the file, with what messages about its members need.
@@ -173,10 +175,13 @@ impl<'f, 'a> Folder<'f, 'a> {
         used: Option<Used>,
     ) -> Result<Vec<T>, IoError> {
         let mut values = values.map_err(self.fault(name))?;
-        if let Some(Used { entries, why }) = used {
+        if let Some(Used { entries, why, room }) = used {
             let found = values.len();
+            let more = room.is_none_or(|room| usize::try_from(room) == Ok(found));
             match usize::try_from(entries) {
-                Ok(entries) if entries <= found => values.truncate(entries),
+                Ok(entries) if entries == found || entries < found && more => {
+                    values.truncate(entries);
+                }
                 _ => {
                     let expected = format!("{entries} entries ({why})");
                     return Err(self.error(name, expected, format!("{found} entries")));

@@ -122,6 +122,39 @@ pub fn inverse<const D: usize>(a: &[[f64; D]; D]) -> Option<[[f64; D]; D]> {
     Some(inv)
 }
 
+/// The solution of `A x = b` by elimination with partial pivoting, or `None` where a pivot vanishes relative to the largest entry of the block, as of [`inverse`]. A third of its cost.
+#[inline(always)]
+pub fn solve<const D: usize>(a: &[[f64; D]; D], b: &[f64; D]) -> Option<[f64; D]> {
+    let (mut m, mut x) = (*a, *b);
+    let largest = a.iter().flatten().fold(0.0_f64, |s, v| s.max(v.abs()));
+    for k in 0..D {
+        let p = (k + 1..D).fold(k, |p, i| if m[i][k].abs() > m[p][k].abs() { i } else { p });
+        // NaN too.
+        if !(m[p][k].abs() > 1e-14 * largest && m[p][k].is_finite()) {
+            return None;
+        }
+        m.swap(k, p);
+        x.swap(k, p);
+        let d = 1.0 / m[k][k];
+        for i in k + 1..D {
+            let f = m[i][k] * d;
+            for j in k + 1..D {
+                m[i][j] -= f * m[k][j];
+            }
+            x[i] -= f * x[k];
+        }
+        // The diagonal keeps its inverse.
+        m[k][k] = d;
+    }
+    for k in (0..D).rev() {
+        for j in k + 1..D {
+            x[k] -= m[k][j] * x[j];
+        }
+        x[k] *= m[k][k];
+    }
+    Some(x)
+}
+
 /// The D consecutive entries of contact `c` in a stacked vector.
 #[inline(always)]
 pub fn block<const D: usize>(x: &[f64], c: usize) -> [f64; D] {
@@ -154,6 +187,17 @@ mod tests {
                 assert!((column[j] - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }
+    }
+
+    #[test]
+    fn a_solution_is_that_of_the_inverse() {
+        let a = [[0.0, 2.0, 1.0], [1.0, -3.0, 0.5], [4.0, 0.1, 2.0]];
+        let b = [1.0, -2.0, 0.5];
+        let x = solve(&a, &b).expect("invertible");
+        let y = mul(&inverse(&a).expect("invertible"), &b);
+        assert!(x.iter().zip(&y).all(|(x, y)| (x - y).abs() < 1e-14), "{x:?} {y:?}");
+        assert!(solve(&[[1.0, 2.0], [2.0, 4.0]], &[1.0, 0.0]).is_none());
+        assert!(solve(&[[f64::NAN; 2]; 2], &[1.0, 0.0]).is_none());
     }
 
     #[test]

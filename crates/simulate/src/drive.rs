@@ -106,7 +106,11 @@ pub(crate) fn run<S: Driven>(
     let mut run = RunReport { t: simulation.time(), ..RunReport::default() };
     // What is left of the last step up to the rounding of the sum that time is is no step: t/h terms, each rounded by ε t.
     let summed = f64::EPSILON * until.abs() * (until.abs() / h).max(4.0);
-    let shortest = h.min(until - simulation.time()).max(summed);
+    let left = until - simulation.time();
+    if left <= summed.min(1e-3 * h) {
+        return Ok(run);
+    }
+    let shortest = h.min(left);
     let rounding = summed.clamp(1e-9 * shortest, 1e-3 * shortest);
     while simulation.time() < until - rounding {
         if is_cancelled(simulation.limits()) {
@@ -167,5 +171,25 @@ fn joined(first: StepReport, second: StepReport) -> StepReport {
         drift,
         timings,
         ..second
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{Body, MoreauJean, Shape, Simulation, World};
+
+    #[test]
+    fn a_time_that_is_reached_has_no_step_left() {
+        for h in [1e-4, 3e-3, 0.7] {
+            let mut world = World::default();
+            world.add(Body::solid(Shape::Sphere { radius: 0.1 }, 1.0).unwrap());
+            let mut simulation = Simulation::new(world, MoreauJean::default()).unwrap();
+            let mut steps =
+                |until: f64, h: f64| simulation.run(until, h, &mut ()).unwrap().steps as usize;
+            assert_eq!(steps(0.4, h), (0.4 / h).ceil() as usize);
+            assert_eq!([steps(0.4, h), steps(0.4, h), steps(0.2, h)], [0; 3], "{h}");
+            // What is more than rounding is left, however little it is.
+            assert_eq!([steps(0.4 + 1e-9, h), steps(0.4 + 2e-9, 1e-10)], [1, 10], "{h}");
+        }
     }
 }

@@ -249,7 +249,7 @@ pub struct ContactReport {
     pub active: bool,
     /// `[r_N, r_T1, r_T2]`, N·s; the force is r/h unless there was an impact.
     pub impulse: [f64; 3],
-    /// `[u_N, u_T1, u_T2]` before the step, m/s.
+    /// `[u_N, u_T1, u_T2]` before the step, m/s; zero if the contact took no part.
     pub before: [f64; 3],
     /// The same after it.
     pub after: [f64; 3],

@@ -80,13 +80,17 @@ fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) ->
     };
     let mut nearly = None;
     let mut start = None;
+    let mut open = "";
     // Half of the time is for what follows; where nothing follows, the rest is for the solver too.
     for share in [0.5, 1.0] {
         let mut how = Solve::new().limits(left(share));
         if let Some(point) = &start {
             how = how.warm::<AnyPoint>(point);
         }
-        let Ok(answer) = how.run(&problem) else { break };
+        let answer = match how.run(&problem) {
+            Ok(answer) => answer,
+            Err(e) => return Existence::Unknown { why: e.to_string() },
+        };
         match &answer.status {
             Status::Infeasible(proof) => {
                 return Existence::NoSolution { proof: proof.clone() };
@@ -101,10 +105,11 @@ fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) ->
             }
             _ => {}
         }
-        let near = || exactly(&problem, Some(&unknowns(&answer.point)));
-        let cases = || if start.is_none() { exactly(&problem, None) } else { None };
-        if let Some(decided) = near().or_else(cases) {
-            return decided;
+        let near = exactly(&problem, Some(&unknowns(&answer.point)));
+        let cases = |_| if start.is_none() { exactly(&problem, None) } else { Err(open) };
+        match near.or_else(cases) {
+            Ok(decided) => return decided,
+            Err(why) => open = why,
         }
         if answer.status != Status::Limit(Limit::Time) {
             break;
@@ -115,7 +120,7 @@ fn decided(linear: &Complementarity, known: Option<Classes>, limits: &Limits) ->
         (Some(nearly), _) => nearly,
         (None, Some(limit)) => criterion::late(limit),
         (None, None) => Existence::Unknown {
-            why: "no solver found a solution, none proved that there is none, and there are too many cases to enumerate".into(),
+            why: format!("no solver found a solution, none proved that there is none, and {open}"),
         },
     }
 }
@@ -160,13 +165,15 @@ fn unknowns(point: &AnyPoint) -> Vec<f64> {
 }
 
 /// What the problem in fractions says, among the cases that a point proposes, or of few pairs among all.
-fn exactly(problem: &AnyProblem, point: Option<&[f64]>) -> Option<Existence> {
+///
+/// Errors: why it says nothing.
+fn exactly(problem: &AnyProblem, point: Option<&[f64]>) -> Result<Existence, &'static str> {
     if problem.unknowns() > ROWS {
-        return None;
+        return Err("there are too many unknowns for fractions");
     }
-    let system = problem.cones()?;
+    let system = problem.cones().ok_or("the entries of its matrix are not known")?;
     if point.is_none() && system.pairs.len() > PAIRS {
-        return None;
+        return Err("there are too many cases to enumerate");
     }
     let mut search = match point {
         Some(point) => ExactCones::near(WORK, system.clone(), point),
@@ -176,20 +183,23 @@ fn exactly(problem: &AnyProblem, point: Option<&[f64]>) -> Option<Existence> {
         match search.advance() {
             None => {}
             Some(Found::Solution(t)) => {
-                return (system.complete && system.solved_by(&t)).then(|| Existence::Solved {
-                    representable: is_representable(problem, &system, &t),
-                    coefficients: ExactVector(t),
-                });
+                let solved = system.complete && system.solved_by(&t);
+                return solved
+                    .then(|| Existence::Solved {
+                        representable: is_representable(problem, &system, &t),
+                        coefficients: ExactVector(t),
+                    })
+                    .ok_or("a relaxation of it has a solution");
             }
             // That there is none where a point is says nothing of the others.
-            Some(Found::Nothing(_)) if point.is_some() => return None,
+            Some(Found::Nothing(_)) if point.is_some() => return Err("there is none near a point"),
             Some(Found::Nothing(vectors)) => {
                 return match problem.evidence(&Certificate::Separating { vectors }) {
-                    Evidence::Proved(proof) => Some(Existence::NoSolution { proof }),
-                    _ => None,
+                    Evidence::Proved(proof) => Ok(Existence::NoSolution { proof }),
+                    _ => Err("the proof by its cases could not be verified"),
                 };
             }
         }
     }
-    None
+    Err("the enumeration of its cases was cut short")
 }

@@ -78,6 +78,34 @@ fn a_solution_needs_no_solver() {
     }
 }
 
+/// Starts whose squares overflow: what is returned is finite all the same, and so are its residuals.
+#[test]
+fn huge_starts_do_no_harm() {
+    let (problem, _) = planted();
+    let names = [
+        "auto",
+        "nsgs",
+        "admm",
+        "proximal/admm",
+        "ncp/path",
+        "glocker/path",
+        "ncp/auto",
+        "glocker/auto",
+    ];
+    for name in names {
+        for size in [1e100, 1e160, 1e200, 1e300] {
+            let mut session = registry::session::<P>(name, &SettingsMap::new()).unwrap();
+            let mut point = problem.origin();
+            point.r.fill(size);
+            let limits = Limits { max_iterations: 20, ..Limits::default() };
+            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            assert!(point.r.iter().all(|r| r.is_finite()), "{name} {size:e}: {:?}", point.r);
+            let merit = outcome.measure.merit();
+            assert!(merit.is_finite(), "{name} {size:e}: {:?}", outcome.measure);
+        }
+    }
+}
+
 #[test]
 fn a_solver_that_lies_is_not_believed() {
     let (problem, _) = planted();

@@ -222,6 +222,17 @@ fn all_solutions_of_a_small_problem_are_listed() {
     std::fs::write(folder.path("none.toml"), "kind = \"lcp\"\nM = [[0]]\nq = [-1]\n").unwrap();
     let text = folder.run("solve none.toml --all-solutions").exits(1).stdout;
     assert!(text.contains("no solution; there are no others"), "{text}");
+    // A line of a free variable; what needs more digits than doubles have.
+    let line = "kind = \"mlcp\"\nA = [[0]]\na = [0]\nB = [[1]]\nb = [-1]\n";
+    std::fs::write(folder.path("line.toml"), line).unwrap();
+    let text = folder.run("solve line.toml --all-solutions").exits(0).stdout;
+    assert!(text.contains("line: (1, 0)") && text.contains("end: (0, 1)"), "{text}");
+    let line = &folder.run("solve line.toml --all-solutions --json").exits(0).json()[0];
+    assert_eq!(line["solutions"][0]["lines"].to_string(), "[[1.0,0.0]]");
+    let far = "kind = \"lcp\"\nM = [[1e-300]]\nq = [-1e300]\n";
+    std::fs::write(folder.path("far.toml"), far).unwrap();
+    let text = folder.run("solve far.toml --all-solutions").exits(1).stdout;
+    assert!(text.contains("perhaps there are some") && !text.contains("no others"), "{text}");
     folder.run("solve rectifier.toml --all-solutions").exits(0);
     folder
         .run("solve wall.hdf5 --all-solutions")

@@ -59,7 +59,7 @@ const KINDS: &[Kind] = &[
 /// The format.
 ///
 /// Reading: a `/solution` needs `u` and `r`, `v` if the problem is global, `l` if it has bilateral constraints.
-/// Not read: `nzmax`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups. Soft links are followed, up to 16 in a
+/// Not read: `nzmax` but as the length of arrays of triplets with room beyond `nz`, matrix info (`conditioning`, ...), guesses beyond `number_of_guesses`, other groups. Soft links are followed, up to 16 in a
 /// row; one that leads nowhere is an error that says where to. External links are refused. The cost is proportional to the size of the file in time and
 /// memory, whatever the file says of itself; a dataset that the file has no room for is refused before anything is allocated by its size.
 ///

@@ -99,8 +99,9 @@ fn local<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionLocal<D, L>, I
     let contacts = format!("{D} for each entry of vectors/mu");
     let W = g.matrix("W", (m, m), &contacts)?;
     let q = vectors.vector("q", m, &contacts)?;
+    let stated = vectors.stated_bounds()?;
     let bilateral = match (g.folder("V")?, g.folder("R")?, vectors.has("s")?) {
-        (None, None, false) => None,
+        (None, None, false) if stated.is_empty() => None,
         (Some(_), Some(_), true) => {
             let s = vectors.reals("s", None)?;
             let p = s.len();
@@ -110,7 +111,7 @@ fn local<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionLocal<D, L>, I
         }
         (V, R, s) => {
             let parts = [("V", V.is_some()), ("R", R.is_some()), ("vectors/s", s)];
-            return Err(g.incomplete(&parts));
+            return Err(g.incomplete(&[&parts[..], &stated].concat()));
         }
     };
     let mu_r = L::Rolling::of(vectors.rolling(L::DISKS)?);
@@ -125,18 +126,28 @@ fn global<const D: usize, L: Law<D>>(g: &Folder) -> Result<FrictionGlobal<D, L>,
     let f = vectors.reals("f", None)?;
     let n = f.len();
     let contacts = format!("{D} for each entry of vectors/mu");
+    let rows = |name| g.need(name).and_then(|matrix| matrix.int("m")).ok();
+    // Where M and H agree it is f that is wrong.
+    if let Some(m) = rows("M").filter(|m| rows("H") == Some(*m) && *m != n as i64) {
+        let expected = format!("{m} entries (the rows of M and H)");
+        return Err(vectors.error("f", expected, format!("{n} entries")));
+    }
     let M = g.matrix("M", (n, n), "the entries of vectors/f")?;
     let H = g.matrix("H", (n, m), &format!("the entries of vectors/f, by {contacts}"))?;
     let w = vectors.vector("w", m, &contacts)?;
+    let stated = vectors.stated_bounds()?;
     let bilateral = match (g.folder("G")?, vectors.has("b")?) {
-        (None, false) => None,
+        (None, false) if stated.is_empty() => None,
         (Some(_), true) => {
             let b = vectors.reals("b", None)?;
             let why = "the entries of vectors/f, by the entries of vectors/b";
             let (G, bounds) = (g.matrix("G", (n, b.len()), why)?, vectors.bounds(b.len())?);
             Some(RowsGlobal { G, b, bounds })
         }
-        (G, b) => return Err(g.incomplete(&[("G", G.is_some()), ("vectors/b", b)])),
+        (G, b) => {
+            let parts = [("G", G.is_some()), ("vectors/b", b)];
+            return Err(g.incomplete(&[&parts[..], &stated].concat()));
+        }
     };
     let mu_r = L::Rolling::of(vectors.rolling(L::DISKS)?);
     Ok(FrictionGlobal { M, H, f, w, mu, mu_r, rows: bilateral })
@@ -220,6 +231,17 @@ impl Folder<'_, '_> {
         }
     }
 
+    /// The bounds that are there, as parts of the problem, see [`incomplete`](Self::incomplete).
+    fn stated_bounds(&self) -> Result<Vec<(&'static str, bool)>, IoError> {
+        let mut stated = vec![];
+        for (name, part) in [("lower", "vectors/lower"), ("upper", "vectors/upper")] {
+            if self.has(name)? {
+                stated.push((part, true));
+            }
+        }
+        Ok(stated)
+    }
+
     fn spacedim(&self, known: &[i64]) -> Result<i64, IoError> {
         match self.int("spacedim")? {
             d if known.contains(&d) => Ok(d),
@@ -274,7 +296,7 @@ impl Folder<'_, '_> {
                     if nz == -1 { ("row", columns, rows) } else { ("column", rows, columns) };
                 let pointers = g.pointers(count)?;
                 let why = format!("p[{count}]");
-                let used = Some(Used { entries: pointers[count] as u64, why: &why });
+                let used = Some(Used { entries: pointers[count] as u64, why: &why, room: None });
                 let (i, x) = (g.ints("i", used)?, g.reals("x", used)?);
                 let minor = g.indices("i", what, &i, bound)?;
                 // Not before i and x are known to be as long.
@@ -283,7 +305,9 @@ impl Folder<'_, '_> {
                 if nz == -1 { (major, minor, x) } else { (minor, major, x) }
             }
             nz if nz >= 0 => {
-                let used = Some(Used { entries: nz as u64, why: "nz" });
+                // More than nz without the room for it are entries that nz forgets.
+                let room = g.int("nzmax").unwrap_or(nz);
+                let used = Some(Used { entries: nz as u64, why: "nz", room: Some(room) });
                 let (p, i, x) = (g.ints("p", used)?, g.ints("i", used)?, g.reals("x", used)?);
                 (g.indices("p", "column", &p, columns)?, g.indices("i", "row", &i, rows)?, x)
             }

@@ -83,9 +83,12 @@ fn all_storages_of_a_matrix_read_alike() {
     for (nz, storage) in [(-1, columns), (-2, rows), (13, triplets)] {
         let tree = local_tree().matrix(path, shape(nz), storage);
         assert_eq!(read(&tree), expected, "nz = {nz}");
-        // nzmax is only the room that a writer had.
+        // nzmax is only the room that a writer had; of triplets it says how many entries more than nz there may be.
         let tree = tree.set("fclib_local/W/nzmax", Data::I(vec![1000]));
-        assert_eq!(read(&tree), expected, "nz = {nz}");
+        match nz {
+            13 => refused(&tree, "/fclib_local/W/x: expected 13 entries (nz), found 14 entries"),
+            _ => assert_eq!(read(&tree), expected, "nz = {nz}"),
+        }
     }
 }
 
@@ -170,6 +173,7 @@ fn what_follows_the_last_entry_means_nothing() {
     let with = |nz, p: Data, i: &[f64], x: &[f64]| {
         local_tree()
             .set(&format!("{path}/nz"), Data::I(vec![nz]))
+            .set(&format!("{path}/nzmax"), Data::I(vec![13]))
             .set(&format!("{path}/p"), p)
             .set(&format!("{path}/i"), reals(i))
             .set(&format!("{path}/x"), reals(x))
@@ -303,6 +307,28 @@ fn missing_parts_are_named() {
              {nothing}"
         ),
     );
+    // Bounds of rows that are not there.
+    let bounds = |tree: Tree, at: &str| {
+        let bound =
+            |tree: Tree, side| tree.set(&format!("{at}/vectors/{side}"), Data::F(vec![0.0]));
+        bound(bound(tree, "lower"), "upper")
+    };
+    refused(
+        &bounds(local_tree(), "fclib_local"),
+        &format!(
+            "/fclib_local/V and /fclib_local/R and /fclib_local/vectors/s: expected it beside \
+             /fclib_local/vectors/lower and /fclib_local/vectors/upper (bilateral constraints), {nothing}"
+        ),
+    );
+    let rowless = global_tree().without("fclib_global/G").without("fclib_global/vectors/b");
+    let global = bounds(rowless, "fclib_global");
+    refused(
+        &global,
+        &format!(
+            "/fclib_global/G and /fclib_global/vectors/b: expected it beside \
+             /fclib_global/vectors/lower and /fclib_global/vectors/upper (bilateral constraints), {nothing}"
+        ),
+    );
     refused(
         &local_tree().without("fclib_local/W/x").set("fclib_local/W/x/", Data::Scalar(0)),
         "/fclib_local/W/x: expected a dataset, found a group",
@@ -361,7 +387,7 @@ fn wrong_shapes_are_named() {
     );
     refused(
         &global_tree().set("fclib_global/vectors/f", Data::F(vec![])),
-        "/fclib_global/M: expected 0 × 0 (the entries of vectors/f), found 2 × 2",
+        "/fclib_global/vectors/f: expected 2 entries (the rows of M and H), found 0 entries",
     );
     refused(
         &with("W/x", Data::F(vec![1.0; 9])),

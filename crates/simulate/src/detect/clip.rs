@@ -2,7 +2,7 @@
 //!
 //! The axes are the normals of all faces and the products of those pairs of edges that make a face of the Minkowski difference (their arcs on the Gauss map
 //! cross). The axis of the last step stays unless another is better by [`HYSTERESIS`] of the size, so that normals do not hop between near ties. On a
-//! face axis the face of the other body that looks against it most is clipped by the planes through the sides of the reference face (Sutherland–Hodgman):
+//! face axis the face of the other body that looks against it most, of those with its lowest vertex, is clipped by the planes through the sides of the reference face (Sutherland–Hodgman):
 //! every corner is a vertex of one body or a crossing of two edges, and has its name by that, whichever of the two was clipped.
 //! Cost: faces × vertices, and edges × edges where no faces are parallel.
 
@@ -97,7 +97,7 @@ impl Clip {
         let by_a = best_a >= best_b - FIRST * size;
         let best = best_a.max(best_b);
         let (reference, incident, face) = if by_a { (a, b, face_a) } else { (b, a, face_b) };
-        let other = incident.1.facing(reference.1.normals[face]);
+        let other = incident.1.facing(incident.0, reference.1.normals[face]);
         let (n, m) = (reference.1.normals[face], incident.1.normals[other]);
         let tilt = norm(cross(n, m));
         // Where two faces are parallel no edges can be better by more than rounding.
@@ -152,7 +152,7 @@ impl Clip {
         prediction: f64,
         found: impl FnMut([Feature; 2], Witness),
     ) {
-        let other = b.1.facing(a.1.normals[face]);
+        let other = b.1.facing(b.0, a.1.normals[face]);
         self.faces(a, b, (face, other), true, prediction, found);
     }
 

@@ -132,7 +132,7 @@ pub(crate) fn on_flat(
             }
         }
         Side::Hull { hull, posed, .. } => {
-            let face = posed.facing(n);
+            let face = posed.facing(hull, n);
             let (corners, edges) = (&hull.faces[face], &hull.face_edges[face]);
             for k in 0..corners.len() {
                 let at = |i: usize| posed.vertices[corners[i % corners.len()] as usize];

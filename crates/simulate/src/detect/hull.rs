@@ -11,6 +11,8 @@ use crate::rotation::Pose;
 const WELD: f64 = 1e-10;
 /// Faces whose unit normals differ by less than this are parts of one face.
 const COPLANAR: f64 = 1e-9;
+/// Corners that are higher than the lowest one by less than this share of the size are as low.
+const LOWEST: f64 = 1e-9;
 
 /// An edge: its ends, and the faces on both sides.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -174,12 +176,18 @@ pub(crate) struct PosedHull {
 }
 
 impl PosedHull {
-    /// The face that looks against n most.
-    pub fn facing(&self, n: Vec3) -> usize {
+    /// The face that looks against n most, of those with a vertex that is lowest along n: another one may look against n more and be higher as a whole.
+    pub fn facing(&self, hull: &Hull, n: Vec3) -> usize {
+        let lowest = |f: usize| {
+            let heights = hull.faces[f].iter().map(|&k| dot(n, self.vertices[k as usize]));
+            heights.fold(f64::INFINITY, f64::min)
+        };
+        let heights = self.vertices.iter().map(|&v| dot(n, v));
+        let level = heights.fold(f64::INFINITY, f64::min) + LOWEST * hull.size;
         let mut best = (0, f64::INFINITY);
         for (f, &m) in self.normals.iter().enumerate() {
             let now = dot(n, m);
-            if now < best.1 {
+            if now < best.1 && lowest(f) <= level {
                 best = (f, now);
             }
         }

@@ -79,6 +79,9 @@ pub(crate) struct Scratch {
     pub(super) pairs: Vec<(u32, u32)>,
     pub(super) stack: Vec<(u32, u32)>,
     pub(super) found: Vec<([Feature; 2], Witness)>,
+    /// Where surfaces meet, and pairs of edges, with their gaps, that count where they do not.
+    pub(super) met: Vec<Vec3>,
+    pub(super) held: Vec<(f64, [Feature; 2], Witness)>,
 }
 
 /// A triangle as a polyhedron without thickness.
@@ -293,16 +296,16 @@ impl Surface {
         cross(self.normals[t as usize], sub(q, p))
     }
 
-    /// Whether n, in the frame of the body, is a normal of the surface at a feature: it goes into no triangle there.
+    /// Whether n, in the frame of the body, is a normal of the surface at a feature: it goes into no triangle there. At an edge between triangles with normals n₁ and n₂ these are
+    /// ±(a n₁ + b n₂), a, b ≥ 0, with + where it is convex: there `n · (n₁ + n₂) ≥ 0`, though `n · n₁ < 0` may be where it is sharp.
     pub(super) fn has_normal(&self, feature: Feature, n: Vec3) -> bool {
         let away = |d: Vec3| dot(n, d) <= CONE * norm(d);
         match feature {
             Feature::Edge(e) => {
                 let of = self.edges[e as usize].0;
-                of.iter().filter(|t| **t != NONE).all(|&t| {
-                    away(self.inwards(t, e))
-                        && (!self.one_sided || dot(n, self.normals[t as usize]) >= -CONE)
-                })
+                let of = || of.iter().copied().filter(|&t| t != NONE);
+                let outwards = || of().map(|t| dot(n, self.normals[t as usize])).sum::<f64>();
+                of().all(|t| away(self.inwards(t, e))) && (!self.one_sided || outwards() >= -CONE)
             }
             Feature::Vertex(v) => self.is_top(v, n, CONE),
             Feature::Face(_) | Feature::Curved(_) => false,

@@ -5,7 +5,8 @@
 //! features, so that nothing is met across an edge that is not there.
 //!
 //! A triangle does not say how deep a body is behind it. What is deeper than a share of the thinner body is no contact; and of two faces that a point is behind the nearer one is
-//! met: a corner that has sunk a little into the top of a box is not far behind its side. Two edges that are near a face so are met all the same where nothing else is: the least deep.
+//! met: a corner that has sunk a little into the top of a box is not far behind its side. Two edges that are near a face so are met all the same, the least deep first, where nothing
+//! else is met within their depth.
 //!
 //! Cost: the pairs of triangles that are near each other, times the logarithm of all.
 
@@ -45,12 +46,14 @@ pub(crate) fn collide(
 ) {
     let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
     let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
-    let Scratch { thin, other, pairs, stack, found: list, .. } = scratch;
+    let Scratch { thin, other, pairs, stack, found: list, met, held, .. } = scratch;
     let thin_body = a.thickness.min(b.thickness);
     let margin = f64::max(prediction, SUNK * thin_body);
     near(a, b, &relative, margin, (pairs, stack));
-    let (mut last, mut none) = (u32::MAX, true);
-    let mut least: Option<(Across, [Feature; 2])> = None;
+    let mut last = u32::MAX;
+    let at = |witness: &Witness| witness.place(a_pose, b_pose, [0.0, 0.0, 1.0]).point;
+    met.clear();
+    held.clear();
     for &(t, u) in &*pairs {
         if t != last {
             a.template(t, a_pose, thin);
@@ -67,9 +70,10 @@ pub(crate) fn collide(
                 if too_deep(list, (first.0, first.3), second.3, thin_body) {
                     continue;
                 }
-                none &= list.is_empty();
                 for &([f, g], w) in list.iter() {
-                    if on_a { found([f, g], w) } else { found([g, f], w.swapped()) }
+                    let (features, w) = if on_a { ([f, g], w) } else { ([g, f], w.swapped()) };
+                    met.push(at(&w));
+                    found(features, w);
                 }
                 // What lies on each other is met with the normal of the first.
                 if both {
@@ -78,20 +82,27 @@ pub(crate) fn collide(
             }
         }
         for (e, f) in edges((a, t), (b, u)) {
-            let Some(met) = across((a, a_pose, e), (b, b_pose, f), prediction, thin_body) else {
+            let Some(Across { witness, gap, near_a_face }) =
+                across((a, a_pose, e), (b, b_pose, f), prediction, thin_body)
+            else {
                 continue;
             };
             let features = [Feature::Edge(e), Feature::Edge(f)];
-            if !met.near_a_face {
-                none = false;
-                found(features, met.witness);
-            } else if least.as_ref().is_none_or(|(least, _)| met.gap > least.gap) {
-                least = Some((met, features));
+            if near_a_face {
+                held.push((gap, features, witness));
+            } else {
+                met.push(at(&witness));
+                found(features, witness);
             }
         }
     }
-    if none && let Some((met, features)) = least {
-        found(features, met.witness);
+    held.sort_unstable_by(|x, y| y.0.total_cmp(&x.0));
+    for (gap, features, witness) in held.drain(..) {
+        let here = at(&witness);
+        if met.iter().all(|&there| norm(sub(there, here)) > -gap) {
+            met.push(here);
+            found(features, witness);
+        }
     }
 }
 

@@ -901,6 +901,104 @@ fn a_mesh_of_a_box_touches_as_the_box() {
     assert_eq!(gaps(&two(Body::floor(), solid(crate_mesh(half)).at([0.0, 0.0, 0.31]))).len(), 4);
 }
 
+#[test]
+fn the_lowest_vertex_touches_though_its_faces_look_down_less_than_another() {
+    // Two faces of 30 degrees beside the lowest vertex at one end of a keel, another one of 20 above it.
+    let t = std::f64::consts::FRAC_PI_6.tan();
+    let end = [[t, -1.0, 1.0], [-t, -1.0, 1.0], [t, 1.75, 1.0], [-t, 1.75, 1.0]];
+    let vertices: Vec<Vec3> = [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]].into_iter().chain(end).collect();
+    let faces =
+        [vec![0, 2, 3], vec![1, 5, 4], vec![0, 1, 4, 2], vec![0, 3, 5, 1], vec![2, 4, 5, 3]];
+    let keel = solid(Polyhedron::new(vertices, faces.into()).unwrap());
+    let mut grounds = flat_grounds();
+    grounds.push(
+        Body::fixed(vec![Part::new(Shape::Box { half: [3.0, 3.0, 0.5] })]).at([0.0, 0.0, -0.5]),
+    );
+    let mut disc = cylinder(0.5, 3.0).at([0.0, 0.0, -0.5]);
+    disc.motion = crate::Motion::Fixed;
+    grounds.push(disc);
+    for angle in [0.05, 0.2] {
+        let there = |z: f64| {
+            keel.clone().turned(Rotation::about([1.0, 0.0, 0.0], angle)).at([0.13, 0.07, z])
+        };
+        let lowest = gaps(&two(Body::floor(), there(0.0)))[0];
+        for gap in [0.01, -0.003] {
+            let on_plane = contacts(&two(Body::floor(), there(gap - lowest)));
+            let p = on_plane.iter().min_by(|a, b| a.place.gap.total_cmp(&b.place.gap)).unwrap();
+            for (k, ground) in grounds.iter().enumerate() {
+                let found = contacts(&two(ground.clone(), there(gap - lowest)));
+                let same = |n: &Near| norm(sub(n.place.point, p.place.point)) < 1e-9;
+                assert!(found.iter().any(same), "{angle} {gap} {k} {found:#?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sharp_edges_are_met_from_all_sides() {
+    // A wedge of 45 degrees as a mesh and as a polyhedron, and a ridge of 53.
+    let ends = |y: f64| [[-2.0, y, 0.0], [0.0, y, 0.0], [-2.0, y, -2.0]];
+    let vertices: Vec<Vec3> = ends(-1.0).into_iter().chain(ends(1.0)).collect();
+    let sides = [[0, 2, 1], [3, 4, 5]];
+    let quads = [[0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]];
+    let halves = quads.iter().flat_map(|q| [[q[0], q[1], q[2]], [q[0], q[2], q[3]]]);
+    let triangles: Vec<_> = sides.into_iter().chain(halves).collect();
+    let faces = sides.iter().map(|f| f.to_vec()).chain(quads.iter().map(|f| f.to_vec()));
+    let mesh = crate::Mesh::new(&vertices, &triangles).unwrap();
+    let whole = Polyhedron::new(vertices, faces.collect()).unwrap();
+    let fixed = |part: Part| Body::fixed(vec![part]);
+    let (mesh, whole) = (fixed(Part::new(mesh)), fixed(Part::new(Shape::from(whole))));
+    let ball = solid(Shape::Sphere { radius: 0.3 });
+    let out = |degrees: f64| {
+        let (s, c) = degrees.to_radians().sin_cos();
+        [c, 0.0, s]
+    };
+    for degrees in [89.0, 70.0, 50.0, 20.0, -10.0, -40.0] {
+        let n = out(degrees);
+        let found = contacts(&two(mesh.clone(), ball.clone().at(scale(0.31, n))));
+        assert_eq!(found.len(), 1, "{degrees} {found:?}");
+        let place = found[0].place;
+        assert!((place.gap - 0.01).abs() < 1e-9 && norm(sub(place.normal, n)) < 1e-9, "{place:?}");
+        let others = [
+            solid(Shape::Capsule { half_length: 0.4, radius: 0.3 }),
+            cylinder(0.3, 0.3),
+            cuboid([0.3, 0.2, 0.25]),
+            solid(crate_mesh([0.3, 0.2, 0.25])),
+        ];
+        for (k, other) in others.into_iter().enumerate() {
+            let other = other.turned(Rotation::about([0.3, 1.0, 0.1], 0.7));
+            let at = |far: f64| other.clone().at(scale(far, n));
+            let near =
+                |&far: &f64| gaps(&two(whole.clone(), at(far))).first().is_some_and(|g| *g < 0.01);
+            let far = (0..200).map(|k| 1.0 - 0.004 * f64::from(k)).find(near).unwrap();
+            let [p, q] = [&whole, &mesh].map(|solid| gaps(&two(solid.clone(), at(far))));
+            // Two meshes may meet elsewhere too.
+            let count = if k < 3 { 1 } else { q.len() };
+            let same = q.iter().take(count).any(|g| (g - p[0]).abs() < 1e-6);
+            assert!(same, "{degrees} {k} {p:?} {q:?}");
+        }
+    }
+    let field = |heights: [f64; 3]| {
+        let heights = [heights.to_vec(), heights.to_vec()];
+        fixed(Part::new(crate::Mesh::heightfield(&heights, [1.0, 4.0]).unwrap()))
+    };
+    for degrees in [90.0, 60.0, 35.0, 28.0, 150.0] {
+        let n = out(degrees);
+        let at = add([0.0, 0.1, 1.0], scale(0.31, n));
+        let found = contacts(&two(field([0.0, 1.0, 0.0]), ball.clone().at(at)));
+        assert_eq!(found.len(), 1, "{degrees} {found:?}");
+        assert!(norm(sub(found[0].place.normal, n)) < 1e-9, "{degrees} {found:?}");
+    }
+    // The bottom of a valley is none: there the slopes alone are met.
+    for z in [0.05, 0.11, 0.13] {
+        let small = solid(Shape::Sphere { radius: 0.05 }).at([0.01, 0.1, z]);
+        for near in contacts(&two(field([1.0, 0.0, 1.0]), small)) {
+            let slope = near.place.normal[2] - 0.2_f64.sqrt();
+            assert!(slope.abs() < 1e-9, "{z} {near:?}");
+        }
+    }
+}
+
 /// The separation of a point from a polygon, from below by sampled sides: brute force.
 fn sampled(corners: &[Vec3], at: Vec3) -> f64 {
     const STEPS: usize = 2000;
@@ -1064,6 +1162,32 @@ fn a_mesh_on_a_mesh_touches_as_polyhedra_do() {
         same += usize::from((p - q).abs() < 1e-6);
     }
     assert!(touching > 50 && 10 * same > 8 * touching, "{same} of {touching}");
+}
+
+#[test]
+fn edges_of_meshes_that_nearly_lie_on_faces_are_met() {
+    let (half, other) = ([0.5, 0.4, 0.3], [0.3, 0.2, 0.2]);
+    let mut seen = 0;
+    for angle in [0.005, 0.015, 0.03, 0.045, 0.06, 0.1] {
+        // Its edge is inclined to the lower top, and the edge of that to its bottom; on the other side it is just above the top.
+        let lean = Rotation::about([0.0, 1.0, 0.0], angle);
+        let turned = Rotation::about([1.0, 0.0, 0.0], angle).after(lean);
+        let at = |z: f64| [0.4, 0.0, z];
+        let pair = |z: f64| {
+            let boxes = two(cuboid(half), cuboid(other).turned(turned).at(at(z)));
+            let mesh = |half| solid(crate_mesh(half));
+            (boxes, two(mesh(half), mesh(other).turned(turned).at(at(z))))
+        };
+        for depth in [-0.002, 0.0002, 0.002, 0.004] {
+            let gap = |z: f64| gaps(&pair(z).0)[0];
+            let z = (0..3).fold(0.5 + angle * 0.3, |z, _| z - gap(z) - depth);
+            let (boxes, meshes) = pair(z);
+            let [p, q] = [boxes, meshes].map(|world| gaps(&world)[0]);
+            assert!((p - q).abs() < 1e-6, "{angle} {depth} {p} {q}");
+            seen += 1;
+        }
+    }
+    assert_eq!(seen, 24);
 }
 
 #[test]

@@ -31,8 +31,11 @@ impl Tools {
         let violations = match scheme.stabilisation {
             Stabilisation::None => self.joints.violations(world, state).0,
             _ => {
+                let joined = !self.joints.is_empty();
+                let before = if joined { world.potential(state) } else { 0.0 };
                 let violations = self.joints.project(world, state);
-                if !self.joints.is_empty() {
+                if joined {
+                    energy.potential += world.potential(state) - before;
                     let change = self.joints.project_velocities(world, state);
                     energy.kinetic += change;
                     energy.numerical -= change;

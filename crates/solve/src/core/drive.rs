@@ -742,6 +742,10 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
         let measure = match self.judge.certified {
             Some(measure) => measure,
+            // The best point is the start still.
+            None if !self.judge.best_measure.merit().is_finite() => {
+                fallen_back(self.problem, point, self.judge.gauge)
+            }
             None if late && hopeless => self.judge.best_measure,
             None => {
                 // The gauge may have been at another point since.
@@ -751,7 +755,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 if tidied {
                     P::copy_point(self.judge.tidied, point);
                 }
-                measure
+                // A projection that the limit cut short says nothing of a point that was judged before.
+                if measure.merit().is_finite() { measure } else { self.judge.best_measure }
             }
         };
         // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
@@ -895,6 +900,27 @@ pub(crate) fn closely<P: Problem>(
     (plain.unwrap_or_else(|| problem.certify(point, gauge)), false)
 }
 
+/// The certified residuals of a start of which nothing has come; where they are not finite, those of the origin, which then takes its place.
+pub(crate) fn fallen_back<P: Problem>(
+    problem: &P,
+    point: &mut P::Point,
+    gauge: &mut P::Gauge,
+) -> Measure {
+    let start = problem.certify(point, gauge);
+    if start.merit().is_finite() {
+        return start;
+    }
+    let mut origin = problem.origin();
+    let _ = problem.measure(&origin, gauge);
+    problem.follow_impulses(&mut origin, gauge);
+    let measure = problem.certify(&origin, gauge);
+    if !measure.is_better_than(&start) {
+        return start;
+    }
+    *point = origin;
+    measure
+}
+
 /// Since when a solve gets no further.
 #[derive(Debug, Clone, Copy)]
 struct Halved {
@@ -936,6 +962,7 @@ struct Seen {
 /// The judge's visits, the best point among them, and the history.
 struct Judge<'a, P: Problem> {
     gauge: &'a mut P::Gauge,
+    /// The start, as long as no point has finite residuals.
     best: &'a mut P::Point,
     /// The point last certified with its variables exactly on their bounds.
     tidied: &'a mut P::Point,
@@ -956,7 +983,6 @@ struct Judge<'a, P: Problem> {
     calibration: Calibration,
     /// No promise has been broken yet: a broken one costs a look in vain.
     trusting: bool,
-    visited: bool,
 }
 
 impl<'a, P: Problem> Judge<'a, P> {
@@ -985,7 +1011,6 @@ impl<'a, P: Problem> Judge<'a, P> {
             own_wait: 0,
             calibration: Calibration::new(),
             trusting: true,
-            visited: false,
         }
     }
 
@@ -1009,12 +1034,12 @@ impl<'a, P: Problem> Judge<'a, P> {
             None => self.look(problem, point, iteration, tolerance, look),
         };
         // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
-        let mut better = !self.visited
-            || self.latest
-            || self.last.is_better_than(&self.best_measure)
-            || self.last.passes(tolerance);
+        let mut better = self.last.merit().is_finite()
+            && (self.latest
+                || self.last.is_better_than(&self.best_measure)
+                || self.last.passes(tolerance));
         // Residuals may be finite where an impulse that nothing feels is not.
-        if better && self.visited && problem.validate_point(point).is_err() {
+        if better && problem.validate_point(point).is_err() {
             (self.last, better) = (Measure::unknown(), false);
         }
         if better {
@@ -1026,7 +1051,6 @@ impl<'a, P: Problem> Judge<'a, P> {
         let relative = seen.steered.unwrap_or(merit);
         let sample = Sample { iteration, seconds: self.meter.seconds(), relative };
         self.history.note(sample, merit <= self.best_measure.merit());
-        self.visited = true;
         better
     }
 

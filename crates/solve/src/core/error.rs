@@ -2,7 +2,7 @@
 
 use nonsmooth_linalg::MatrixError;
 use nonsmooth_linalg::budget::TooLarge;
-use nonsmooth_problem::ProblemError;
+use nonsmooth_problem::{Problem, ProblemError};
 
 /// Why a solve could not be started.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -63,6 +63,19 @@ impl SolveError {
     /// The method needs something that the problem does not have.
     pub fn needs(expected: &'static str, found: impl Into<String>) -> Self {
         Self::Needs { expected, found: found.into() }
+    }
+
+    /// The error of a method that reformulates `problem`: where that is in order, what is at fault in the other problem is none of the caller's data.
+    pub(crate) fn of_reformulated<P: Problem>(self, problem: &P) -> Self {
+        if self.is_inapplicable() || problem.validate().is_err() {
+            return self;
+        }
+        match self {
+            Self::Problem(e) => {
+                Self::needs("a reformulation within the range of doubles", e.to_string())
+            }
+            other => other,
+        }
     }
 
     /// Whether it says that the method does not apply to the problem, as opposed to a mistake of the caller.

@@ -11,6 +11,7 @@
 //!
 //! Cost: at most 2ᵐ cases for m pairs; a pivot is rows · columns products of integers of rows · 53 bits at most. Storage: a tableau for each open case.
 
+use std::cmp::Ordering;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use dashu_int::ops::{BitTest, Gcd, UnsignedAbs};
@@ -53,12 +54,30 @@ pub struct ExactCones {
 
 /// A case: which columns are excluded, and the tableau on which it goes on. Columns: those of A, the rows' units, b.
 #[derive(Debug, Clone)]
-struct Case {
+pub struct Case {
     rows: Vec<Vec<IBig>>,
     denominator: IBig,
     basis: Vec<usize>,
     excluded: Vec<bool>,
     work: u64,
+}
+
+/// Everything in a case: convex combinations of the points, plus nonnegative multiples of the rays, plus any multiples of the lines. All are coefficients t,
+/// followed by 1 for a point and 0 for a direction.
+#[derive(Debug, Clone)]
+pub struct ExactFace {
+    /// The extreme points, where coefficients that others determine up to the lines are zero.
+    pub points: Vec<Vec<Exact>>,
+    /// The extreme rays.
+    pub rays: Vec<Vec<Exact>>,
+    /// Independent of each other.
+    pub lines: Vec<Vec<Exact>>,
+    /// Lines included.
+    pub dimension: usize,
+    /// Columns that are not excluded.
+    pub allowed: Vec<bool>,
+    /// Columns that are not zero everywhere; of free ones nothing is said.
+    pub support: Vec<bool>,
 }
 
 impl ExactCones {
@@ -83,12 +102,13 @@ impl ExactCones {
         let mut kappa = vec![Exact::ONE; n + 1];
         // Twice: a row's factor changes what the columns have in common.
         for _ in 0..2 {
-            for (row, rho) in a.iter_mut().zip(&mut rho) {
+            // Where time is over what follows is of no use, and the search is cut short.
+            for (row, rho) in a.iter_mut().zip(&mut rho).take_while(|_| !budget::over()) {
                 let factor = common(row.iter());
                 row.iter_mut().for_each(|x| *x = &*x / &factor);
                 *rho = &*rho / &factor;
             }
-            for (j, kappa) in kappa.iter_mut().enumerate() {
+            for (j, kappa) in kappa.iter_mut().enumerate().take_while(|_| !budget::over()) {
                 let factor = common(a.iter().map(|row| &row[j]));
                 a.iter_mut().for_each(|row| row[j] = &row[j] / &factor);
                 *kappa = &*kappa / &factor;
@@ -117,7 +137,7 @@ impl ExactCones {
             excluded: (0..n + m).map(|j| j >= n).collect(),
             work: 0,
         };
-        case.enter_free(&system.free, n);
+        let entered = case.enter_free(&system.free, n) && !budget::over();
         let mut search = Self {
             system,
             rho,
@@ -128,7 +148,7 @@ impl ExactCones {
             cases: 0,
             work: 0,
             allowed,
-            cut: false,
+            cut: !entered,
         };
         search.close_or_open(case);
         search
@@ -157,9 +177,7 @@ impl ExactCones {
             return Some(Found::Nothing(std::mem::take(&mut self.vectors)));
         };
         self.cases += 1;
-        let positive = |j: usize| case.row_of(j).is_some_and(|i| *case.value(i) > IBig::ZERO);
-        let conflict = self.system.pairs.iter().find(|p| p.iter().all(|&j| positive(j)));
-        let Some(&pair) = conflict else {
+        let Some(pair) = self.conflict(&case) else {
             return Some(Found::Solution(self.coefficients(&case)));
         };
         for j in pair {
@@ -170,12 +188,86 @@ impl ExactCones {
         None
     }
 
+    /// A pair of which both columns are positive at the point of a case.
+    pub fn conflict(&self, case: &Case) -> Option<[usize; 2]> {
+        let positive = |j: usize| case.row_of(j).is_some_and(|i| *case.value(i) > IBig::ZERO);
+        self.system.pairs.iter().find(|p| p.iter().all(|&j| positive(j))).copied()
+    }
+
+    /// A pair of which neither column is excluded from a case.
+    pub fn undecided(&self, case: &Case) -> Option<[usize; 2]> {
+        self.system.pairs.iter().find(|p| p.iter().all(|&j| !case.excluded[j])).copied()
+    }
+
+    /// The case that a search begins with, taken out of it, for whoever goes through all cases: `None` where it has no point, and where a limit ended the search.
+    pub fn root(&mut self) -> Option<Case> {
+        self.open.pop()
+    }
+
+    /// A case where these columns are excluded as well: `None` where it has no point, and where a limit ended the search.
+    pub fn without(&mut self, case: &Case, columns: &[usize]) -> Option<Case> {
+        let mut case = case.clone();
+        columns.iter().for_each(|&j| case.excluded[j] = true);
+        self.drive_out(&mut case);
+        (!self.cut && case.has_point()).then_some(case)
+    }
+
+    /// Everything in a case in which all pairs are decided and that has a point. `None` where there are more than `most` extreme points and rays, and where a
+    /// limit ended the search.
+    ///
+    /// Method: of the variables that are not basic any nonnegative values satisfy the equations: a cone, once b has a coefficient s ≥ 0 of its own. The basic ones are made
+    /// nonnegative one by one (double description).
+    ///
+    /// Cost: in each of these steps the square of the number of extreme points and rays, times that number.
+    pub fn face(&mut self, case: &Case, most: usize) -> Option<ExactFace> {
+        let n = self.system.columns.len();
+        let mut bounded = vec![true; n];
+        self.system.free.iter().for_each(|&j| bounded[j] = false);
+        let mut case = case.clone();
+        let found = case.generators(&bounded, most);
+        self.cut |= found.is_none() && budget::over();
+        let generators = found?;
+        let mut support = vec![false; n];
+        for x in &generators {
+            support.iter_mut().zip(x).for_each(|(s, x)| *s |= !x.is_zero());
+        }
+        let allowed = (0..n).map(|j| !case.excluded[j]).collect();
+        // What is zero everywhere leaves as many variables as there are dimensions.
+        (0..n).for_each(|j| case.excluded[j] |= bounded[j] && !support[j]);
+        if !case.dismiss(&bounded) {
+            self.cut = true;
+            return None;
+        }
+        // Free columns that depend on the others: no case has them in its basis.
+        let dependent = (0..n).filter(|&j| !bounded[j] && case.row_of(j).is_none());
+        let lines: Vec<_> = dependent.map(|j| self.unscaled(&case.direction(j))).collect();
+        let dimension = case.entering(&bounded).count() + lines.len();
+        let (points, rays): (Vec<_>, Vec<_>) =
+            generators.iter().map(|x| self.unscaled(x)).partition(|x| !x[n].is_zero());
+        Some(ExactFace { points, rays, lines, dimension, allowed, support })
+    }
+
+    /// The coefficients t of a vector over the scaled columns and b; of a point, where that of b is not zero.
+    fn unscaled(&self, x: &[IBig]) -> Vec<Exact> {
+        let (x, last) = x.split_at(self.kappa.len());
+        let part = match Exact::from(last[0].clone()) {
+            zero if zero.is_zero() => Exact::ONE,
+            b => b * &self.beta,
+        };
+        let coefficient = |(x, kappa): (&IBig, &Exact)| Exact::from(x.clone()) * kappa / &part;
+        let is_point = if last[0].is_zero() { Exact::ZERO } else { Exact::ONE };
+        x.iter().zip(&self.kappa).map(coefficient).chain([is_point]).collect()
+    }
+
+    fn drive_out(&mut self, case: &mut Case) {
+        let left = self.allowed.saturating_sub(self.work);
+        self.cut = self.cut || !case.drive_out(self.system.columns.len(), &self.system.free, left);
+        self.work += std::mem::take(&mut case.work);
+    }
+
     /// Whether a point is left to be looked at.
     fn close_or_open(&mut self, mut case: Case) {
-        let free = &self.system.free;
-        let left = self.allowed.saturating_sub(self.work);
-        self.cut |= !case.drive_out(self.system.columns.len(), free, left);
-        self.work += std::mem::take(&mut case.work);
+        self.drive_out(&mut case);
         if self.cut {
             return;
         }
@@ -206,7 +298,7 @@ impl ExactCones {
 }
 
 /// Rows and columns beyond which a problem in exact numbers is not searched: the tableau alone would take seconds.
-const LARGE: [usize; 2] = [250, 1500];
+pub const LARGE: [usize; 2] = [250, 1500];
 
 /// The proof that a problem has no solution, where a search of this cost, see [`ExactCones::within`], finds one. Of nonlinear problems, and of contact in space, a relaxation is searched.
 pub fn refuted<P: Problem>(problem: &P, allowed: u64) -> Option<Proof> {
@@ -325,6 +417,16 @@ fn common<'a>(x: impl Iterator<Item = &'a Exact>) -> Exact {
     if divisor.is_zero() { Exact::ONE } else { Exact::from_parts(divisor.into(), multiple) }
 }
 
+/// Over the greatest common divisor.
+fn primitive(mut x: Vec<IBig>) -> Vec<IBig> {
+    let sizes = x.iter().filter(|x| !x.is_zero()).map(UnsignedAbs::unsigned_abs);
+    let divisor = sizes.reduce(Gcd::gcd).unwrap_or(UBig::ONE);
+    if !divisor.is_one() {
+        x.iter_mut().for_each(|x| *x = std::mem::take(x) / &divisor);
+    }
+    x
+}
+
 /// Pivots by the largest coefficient before Bland's rule, which cannot cycle.
 const DANTZIG: usize = 50;
 
@@ -337,13 +439,13 @@ impl Case {
         self.basis.iter().position(|&j| j == column)
     }
 
-    /// Free columns into the basis, as far as they are independent, then every other row with a nonnegative right-hand side.
-    fn enter_free(&mut self, free: &[usize], n: usize) {
+    /// Free columns into the basis, as far as they are independent, then every other row with a nonnegative right-hand side. False where a limit ended that.
+    fn enter_free(&mut self, free: &[usize], n: usize) -> bool {
         for &j in free {
             let candidate =
                 (0..self.rows.len()).find(|&i| self.basis[i] >= n && !self.rows[i][j].is_zero());
-            if let Some(i) = candidate {
-                self.pivot(i, j);
+            if candidate.is_some_and(|i| !self.pivot(i, j)) {
+                return false;
             }
         }
         for i in 0..self.rows.len() {
@@ -352,12 +454,17 @@ impl Case {
                 self.rows[i].iter_mut().for_each(|x| *x = -std::mem::take(x));
             }
         }
+        true
     }
 
-    fn pivot(&mut self, row: usize, column: usize) {
+    /// False where a limit ended it: the tableau is of no use then.
+    fn pivot(&mut self, row: usize, column: usize) -> bool {
         let pivot = self.rows[row][column].clone();
         let chosen = std::mem::take(&mut self.rows[row]);
         for other in self.rows.iter_mut().filter(|r| !r.is_empty()) {
+            if budget::over() {
+                return false;
+            }
             let factor = other[column].clone();
             for (x, y) in other.iter_mut().zip(&chosen) {
                 let mut product = &*x * &pivot;
@@ -376,6 +483,7 @@ impl Case {
             self.denominator = -std::mem::take(&mut self.denominator);
             self.rows.iter_mut().flatten().for_each(|x| *x = -std::mem::take(x));
         }
+        true
     }
 
     /// Which rows hold a column that is to be driven out.
@@ -389,10 +497,10 @@ impl Case {
         free.iter().for_each(|&j| is_free[j] = true);
         let mut pivots = 0;
         loop {
-            let rows = self.excluded_rows();
-            if rows.iter().all(|&i| self.value(i).is_zero()) {
+            if self.has_point() {
                 return true;
             }
+            let rows = self.excluded_rows();
             if self.work > allowed || budget::over() {
                 return false;
             }
@@ -428,17 +536,116 @@ impl Case {
                 }
             }
             let Some(i) = leaving else { return true };
-            self.pivot(i, j);
+            if !self.pivot(i, j) {
+                return false;
+            }
             pivots += 1;
         }
     }
 
-    /// Where excluded columns could not be driven out: the vector that closes the case, over the scaled rows.
-    fn closing(&self, n: usize) -> Option<Vec<IBig>> {
-        let rows = self.excluded_rows();
-        if rows.iter().all(|&i| self.value(i).is_zero()) {
+    /// Columns that may enter the basis.
+    fn entering<'a>(&'a self, bounded: &'a [bool]) -> impl Iterator<Item = usize> + 'a {
+        let enters = |&j: &usize| bounded[j] && !self.excluded[j] && self.row_of(j).is_none();
+        (0..bounded.len()).filter(enters)
+    }
+
+    /// Takes excluded columns, whose values are zero, out of the basis: where one stays its row says 0 = 0. False where a limit ended that.
+    fn dismiss(&mut self, bounded: &[bool]) -> bool {
+        for i in 0..self.rows.len() {
+            if !self.excluded[self.basis[i]] {
+                continue;
+            }
+            let column = self.entering(bounded).find(|&j| !self.rows[i][j].is_zero());
+            if column.is_some_and(|j| !self.pivot(i, j)) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// How all variables move with the one of this column, or, beyond the last one, with b; b last.
+    fn direction(&self, column: usize) -> Vec<IBig> {
+        let n = self.excluded.len() - self.rows.len();
+        let (place, sign) = match column {
+            j if j < n => (j, -IBig::ONE),
+            _ => (self.excluded.len(), IBig::ONE),
+        };
+        let mut x = vec![IBig::ZERO; n + 1];
+        x[column.min(n)] = self.denominator.clone();
+        for (row, &j) in self.rows.iter().zip(&self.basis) {
+            if j < n && !self.excluded[j] {
+                x[j] = &row[place] * &sign;
+            }
+        }
+        primitive(x)
+    }
+
+    /// The extreme rays of `{(t, s) ≥ 0: A t = b s}`, where free columns may have any sign; see [`ExactCones::face`].
+    fn generators(&mut self, bounded: &[bool], most: usize) -> Option<Vec<Vec<IBig>>> {
+        if !self.dismiss(bounded) {
             return None;
         }
+        let n = bounded.len();
+        let simplicial: Vec<usize> = self.entering(bounded).chain([n]).collect();
+        let pending: Vec<usize> = self
+            .basis
+            .iter()
+            .copied()
+            .filter(|&j| j < n && bounded[j] && !self.excluded[j])
+            .collect();
+        // Bits of a number say which of the inequalities are equalities.
+        if simplicial.len() + pending.len() > u128::BITS as usize {
+            return None;
+        }
+        let all: u128 = simplicial.iter().enumerate().fold(0, |all, (k, _)| all | 1 << k);
+        let first = simplicial.iter().enumerate();
+        let mut rays: Vec<(Vec<IBig>, u128)> =
+            first.map(|(k, &j)| (self.direction(j), all ^ 1 << k)).collect();
+        for (k, &j) in pending.iter().enumerate() {
+            let bit = 1 << (simplicial.len() + k);
+            let sign = |ray: &(Vec<IBig>, u128)| ray.0[j].cmp(&IBig::ZERO);
+            let of = |wanted: Ordering| {
+                (0..rays.len()).filter(|&r| sign(&rays[r]) == wanted).collect::<Vec<_>>()
+            };
+            let (above, below) = (of(Ordering::Greater), of(Ordering::Less));
+            let mut between = vec![];
+            for (&a, &b) in above.iter().flat_map(|a| below.iter().map(move |b| (a, b))) {
+                if budget::over() || rays.len() + between.len() > 2 * most {
+                    return None;
+                }
+                let zeros = rays[a].1 & rays[b].1;
+                // Neighbours: no third one is on all the walls that they share.
+                let on_all = |(r, ray): (usize, &(Vec<IBig>, u128))| {
+                    r != a && r != b && ray.1 & zeros == zeros
+                };
+                if rays.iter().enumerate().any(on_all) {
+                    continue;
+                }
+                let (up, down) = (&rays[a].0, &rays[b].0);
+                let x = up.iter().zip(down).map(|(u, d)| d * &up[j] - u * &down[j]).collect();
+                between.push((primitive(x), zeros | bit));
+            }
+            rays.iter_mut().filter(|r| r.0[j].is_zero()).for_each(|r| r.1 |= bit);
+            rays.retain(|r| r.0[j] >= IBig::ZERO);
+            rays.append(&mut between);
+            if rays.len() > most {
+                return None;
+            }
+        }
+        Some(rays.into_iter().map(|ray| ray.0).collect())
+    }
+
+    /// Whether no excluded column is left with a value.
+    fn has_point(&self) -> bool {
+        self.excluded_rows().iter().all(|&i| self.value(i).is_zero())
+    }
+
+    /// Where excluded columns could not be driven out: the vector that closes the case, over the scaled rows.
+    fn closing(&self, n: usize) -> Option<Vec<IBig>> {
+        if self.has_point() {
+            return None;
+        }
+        let rows = self.excluded_rows();
         let y = |k: usize| -rows.iter().fold(IBig::ZERO, |sum, &i| sum + &self.rows[i][n + k]);
         Some((0..self.rows.len()).map(y).collect())
     }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{History, MODEST, Meter, is_final};
+use crate::core::drive::{History, MODEST, Meter, fallen_back, is_final};
 use crate::core::register::{self, Registered};
 use crate::core::settings::SettingsMap;
 use crate::core::trace::Trace;
@@ -274,7 +274,14 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                 status = Status::Limit(limit);
                 break;
             }
-            let k = self.session(&candidate)?;
+            let k = match self.session(&candidate) {
+                Ok(k) => k,
+                Err(e) => {
+                    self.account.push(inapplicable(&candidate, &e));
+                    stages.ended(&NONE);
+                    continue;
+                }
+            };
             let best = tally.best.as_ref().filter(|_| !candidate.anew);
             let mut trial = best.map_or_else(|| point.clone(), |b| b.0.clone());
             let (before, begun) = (tally.iterations, tally.meter.seconds());
@@ -294,12 +301,15 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             self.gauge = session.reclaim();
             let outcome = match tried {
                 Ok(outcome) => outcome,
-                Err(e) if e.is_inapplicable() => {
-                    self.account.push(format!("{} does not apply: {e}", candidate.name));
+                Err(e) => {
+                    // In a problem that is in order, what is at fault is made by the method.
+                    if !e.is_inapplicable() {
+                        problem.validate()?;
+                    }
+                    self.account.push(inapplicable(&candidate, &e));
                     stages.ended(&NONE);
                     continue;
                 }
-                Err(e) => return Err(e),
             };
             for s in session.history() {
                 let (iteration, seconds) = (before + s.iteration, begun + s.seconds);
@@ -361,8 +371,8 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             }
             None => {
                 let measure = match &mut self.gauge {
-                    Some(gauge) => problem.certify(point, gauge),
-                    None => problem.certify(point, &mut problem.gauge()?),
+                    Some(gauge) => fallen_back(problem, point, gauge),
+                    None => fallen_back(problem, point, &mut problem.gauge()?),
                 };
                 // No time was left for anything: the start may be a solution.
                 if measure.passes(limits.tolerance) && matches!(status, Status::Limit(_)) {
@@ -436,6 +446,11 @@ fn shortened(account: &[String]) -> Vec<String> {
     // What stands before the first candidate.
     let first = heads[0];
     account[..first].iter().cloned().chain(out).collect()
+}
+
+/// Why a candidate did nothing, for the account.
+fn inapplicable(candidate: &Candidate, error: &SolveError) -> String {
+    format!("{} does not apply: {error}", candidate.name)
 }
 
 /// What a candidate did, for the account.

@@ -90,10 +90,15 @@ where
     type Work = ViaWork<P, R, S>;
 
     fn work(&self, problem: &P) -> Result<Self::Work, SolveError> {
-        let (reduced, memo) = self.reformulation.reduce(problem)?;
-        let work = self.solver.work(&reduced)?;
+        let reduce = || -> Result<_, SolveError> {
+            let (reduced, memo) = self.reformulation.reduce(problem)?;
+            let work = self.solver.work(&reduced)?;
+            let gauge = self.reformulation.approximates().map(|_| reduced.gauge()).transpose()?;
+            Ok((reduced, memo, work, gauge))
+        };
+        let made = reduce().map_err(|e| e.of_reformulated(problem))?;
+        let (reduced, memo, work, gauge) = made;
         let (point, tidied) = (reduced.origin(), reduced.origin());
-        let gauge = self.reformulation.approximates().map(|_| reduced.gauge()).transpose()?;
         let (measure, tolerance) = (Measure::unknown(), 0.0);
         Ok(ViaWork {
             reduced,
@@ -110,11 +115,14 @@ where
     }
 
     fn refill(&self, problem: &P, work: &mut Self::Work) -> Result<(), SolveError> {
-        self.reformulation.reduce_again(problem, &mut work.reduced, &mut work.memo)?;
-        if let Some(gauge) = &mut work.gauge {
-            work.reduced.regauge(gauge)?;
-        }
-        self.solver.refill(&work.reduced, &mut work.work)
+        let mut refill = || {
+            self.reformulation.reduce_again(problem, &mut work.reduced, &mut work.memo)?;
+            if let Some(gauge) = &mut work.gauge {
+                work.reduced.regauge(gauge)?;
+            }
+            self.solver.refill(&work.reduced, &mut work.work)
+        };
+        refill().map_err(|e| e.of_reformulated(problem))
     }
 
     fn aim(&self, tolerance: f64, work: &mut Self::Work) {
@@ -126,6 +134,10 @@ where
         (work.measure, work.unjudged) = (Measure::unknown(), 0);
         work.calibration = Calibration::new();
         self.reformulation.lower(problem, point, &work.memo, &mut work.point);
+        // What is finite here may overflow there.
+        if work.reduced.validate_point(&work.point).is_err() {
+            work.point = work.reduced.origin();
+        }
         self.solver.start(&work.reduced, &mut work.point, &mut work.work);
     }
 

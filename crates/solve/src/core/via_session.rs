@@ -6,7 +6,7 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{Meter, concluded};
+use crate::core::drive::{Meter, concluded, fallen_back};
 use crate::core::trace::Trace;
 use crate::{
     Limit, Limits, Observer, Outcome, Progress, Reformulation, Sample, Session, SolveError, Status,
@@ -59,7 +59,8 @@ impl<P: Problem, R: Reformulation<P>> Lifted<'_, P, R> {
             false => self.problem.measure(&self.trial, self.gauge),
         };
         // What passes counts as the best: `own` is no part of the merit.
-        if measure.passes(self.tolerance) || measure.is_better_than(&self.best.1) {
+        let better = measure.passes(self.tolerance) || measure.is_better_than(&self.best.1);
+        if better && self.problem.validate_point(&self.trial).is_ok() {
             P::copy_point(&self.trial, self.best.0);
             self.best.1 = measure;
             if self.observer.keeps_best() {
@@ -109,7 +110,7 @@ where
             Ok(judge) => gauge.insert(judge),
             Err(e) => return meter.ended(Measure::unknown(), limits, &scope, e.into()),
         };
-        let start = problem.certify(point, gauge);
+        let start = fallen_back(problem, point, gauge);
         // To make the other problem may take all the time there is.
         if observer.keeps_best() {
             observer.best(point, &start);
@@ -130,13 +131,17 @@ where
                     0,
                 ));
             }
-            Err(e) => return meter.ended(start, limits, &scope, e),
+            Err(e) => return meter.ended(start, limits, &scope, e.of_reformulated(problem)),
         };
         if let Some(ray) = reformulation.contradiction(memo) {
             return Ok(meter.outcome(concluded(problem, ray), start, 0));
         }
         let mut there = reduced.origin();
         reformulation.lower(problem, point, memo, &mut there);
+        // What is finite here may overflow there.
+        if reduced.validate_point(&there).is_err() {
+            there = reduced.origin();
+        }
         drop(scope);
 
         let mut tolerance = limits.tolerance;
@@ -159,7 +164,8 @@ where
                 max_iterations: limits.max_iterations.saturating_sub(iterations),
                 ..limits.left(begun)
             };
-            let outcome = session.observe(reduced, &mut there, &limits_there, &mut seen)?;
+            let outcome = session.observe(reduced, &mut there, &limits_there, &mut seen);
+            let outcome = outcome.map_err(|e| e.of_reformulated(problem))?;
             iterations += outcome.iterations;
             seen.iterations = iterations;
             let measure = seen.see(&there, true);

@@ -408,3 +408,14 @@ fn composed_names_exist_and_are_described() {
     each::<Hlcp>("mixed");
     assert!(registry::composed_names::<Lcp>().is_empty());
 }
+
+/// What overflows in a reformulation is none of the caller's data: the method does not apply, and `auto` tries others.
+#[test]
+fn data_that_overflow_in_a_reformulation_are_no_mistake() {
+    let one = |x: f64| Dense::from_rows(&[[x]]).unwrap();
+    let boxed = BoxLcp::new(one(-2.0), vec![1.0], vec![-1e308], vec![f64::INFINITY]).unwrap();
+    let error = refused("split/lemke", &boxed);
+    assert!(error.is_inapplicable() && error.to_string().contains("reformulation"), "{error}");
+    let point = solved("auto", &boxed);
+    assert!(boxed.judge(&point, 1e-12).unwrap().solved);
+}

@@ -157,6 +157,21 @@ impl ConeSystem {
         self.refutation(&self.entries(), vectors, &[]).is_some()
     }
 
+    /// Whether y alone separates b from the columns that are not excluded, **in exact arithmetic**: no solution has zeros in all of those that are.
+    pub fn closed_by(&self, entries: &Entries, y: &[f64], excluded: &[bool]) -> bool {
+        if self.wanted.is_some() || y.len() != self.rhs.len() || y.iter().any(|y| !y.is_finite()) {
+            return false;
+        }
+        let y = exacts(y);
+        let power = y.iter().zip(&self.rhs).fold(Exact::ZERO, |sum, (y, b)| sum + y * b);
+        let vector = Vector::new(&y);
+        let sign = |j: usize| self.sign(entries, &vector, j);
+        negative(&power)
+            && self.free.iter().all(|&j| excluded[j] || sign(j).is_eq())
+            && self.rays.iter().all(|&j| excluded[j] || sign(j).is_ge())
+            && self.pairs.iter().flatten().all(|&j| excluded[j] || sign(j).is_ge())
+    }
+
     /// As [`refuted_by`](Self::refuted_by), with the entries in doubles: by how much, see [`Proof::margin`](super::Proof::margin), where the rows of the problem have these weights.
     pub(crate) fn refutation(
         &self,
@@ -208,7 +223,7 @@ impl ConeSystem {
     }
 
     /// The entries in doubles, for as long as the columns stay.
-    pub(crate) fn entries(&self) -> Entries {
+    pub fn entries(&self) -> Entries {
         let doubles = |c: &Column| c.iter().map(|(_, x)| double(x).unwrap_or(f64::NAN)).collect();
         Entries(self.columns.iter().map(doubles).collect())
     }
@@ -377,7 +392,8 @@ impl ConeSystem {
 }
 
 /// The entries of a system in doubles, by columns; NaN where one is none.
-pub(crate) struct Entries(Vec<Vec<f64>>);
+#[derive(Debug, Clone)]
+pub struct Entries(Vec<Vec<f64>>);
 
 /// A vector in exact numbers and in doubles.
 struct Vector<'a> {

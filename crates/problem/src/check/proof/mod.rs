@@ -13,7 +13,7 @@ mod relaxation;
 mod rounding;
 mod statement;
 
-pub use cones::{Column, ConeSystem, NEAR};
+pub use cones::{Column, ConeSystem, Entries, NEAR};
 pub use evidence::{Evidence, ExactVector, Proof};
 pub use exact::{Exact, rounded};
 pub use monotone::Monotone;

@@ -40,6 +40,16 @@ fn pendulum(scheme: MoreauJean, distance: bool) -> (Simulation, [f64; 3]) {
     (Simulation::new(world, scheme).unwrap(), exact)
 }
 
+/// The projection that closes joints moves bodies after the step.
+#[test]
+fn the_potential_energy_told_is_that_where_bodies_are() {
+    let (mut simulation, _) = pendulum(MoreauJean::default(), false);
+    for _ in 0..20 {
+        let told = simulation.step(0.05).unwrap().energy.potential;
+        near(told, G * simulation.state().position[0][2], 1e-13);
+    }
+}
+
 #[test]
 fn a_pendulum_swings_as_elliptic_functions_say_to_second_order() {
     for distance in [true, false] {

@@ -70,11 +70,16 @@ impl Game {
     /// `M = [0 K; Lᵀ 0]` in some order: the graph of its entries has two sides.
     fn of_costs(rows: &[Vec<(usize, f64)>], q: &[f64]) -> Option<Self> {
         let n = q.len();
+        // A strategy may cost nothing by its own row, and be told by the others'.
+        let mut columns = vec![vec![]; n];
+        for (i, row) in rows.iter().enumerate() {
+            row.iter().for_each(|&(j, x)| columns[j].push((i, x)));
+        }
         let mut side: Vec<Option<usize>> = vec![None; n];
         let mut left = vec![0];
         side[0] = Some(0);
         while let Some(i) = left.pop() {
-            for &(j, x) in &rows[i] {
+            for &(j, x) in rows[i].iter().chain(&columns[i]) {
                 let other = 1 - side[i]?;
                 match side[j] {
                     _ if x < 0.0 => return None,

@@ -101,7 +101,9 @@ impl<P: Complementary> Solver<P> for Enumeration {
         if !*started {
             match Case::root(data) {
                 Ok(case) => open.push(case),
-                Err(y) => return Step::NoSolution(Certificate::Farkas { y }),
+                Err(closed) => {
+                    return Step::NoSolution(Certificate::Farkas { y: closed.proof(data) });
+                }
             }
             *started = true;
         }
@@ -119,7 +121,7 @@ impl<P: Complementary> Solver<P> for Enumeration {
             for side in case.sides(data, j) {
                 match case.without(data, side) {
                     Ok(case) => open.push(case),
-                    Err(y) => separating.push(y),
+                    Err(closed) => separating.push(closed.proof(data)),
                 }
             }
         }
@@ -136,105 +138,6 @@ impl<P: Complementary> Solver<P> for Enumeration {
     }
 }
 
-/// Every solution of a problem, as [`all_solutions`] lists them.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Solutions {
-    /// Isolated solutions and families, none contained in another.
-    pub faces: Vec<Face>,
-    /// True if every case was decided: there are no other solutions.
-    pub complete: bool,
-}
-
-/// A solution, or a family of solutions: those of one pattern of `z_i = 0` and `w_i = 0`, a convex polyhedron.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Face {
-    /// The solution; of a family one in its relative interior.
-    pub z: Vec<f64>,
-    /// 0 of a solution that is alone in its pattern.
-    pub dimension: usize,
-    /// Of a family: extreme points, among them for each variable one where it is largest. Both ends of a segment.
-    pub ends: Vec<Vec<f64>>,
-    /// Of an unbounded family: directions in which it goes on for ever.
-    pub rays: Vec<Vec<f64>>,
-    allowed: Vec<bool>,
-    support: Vec<bool>,
-}
-
-impl Solutions {
-    /// Faces of dimension 0.
-    pub fn isolated(&self) -> impl Iterator<Item = &Face> {
-        self.faces.iter().filter(|face| face.dimension == 0)
-    }
-
-    /// The families of more than one solution.
-    pub fn families(&self) -> impl Iterator<Item = &Face> {
-        self.faces.iter().filter(|face| face.dimension > 0)
-    }
-}
-
-/// Lists every solution of an LCP or MLCP: isolated ones as points, in lexicographic order, then families. Stops, and says so, after `limit` patterns with solutions.
-///
-/// ```
-/// use nonsmooth_problem::Lcp;
-/// use nonsmooth_linalg::Dense;
-/// use nonsmooth_solve::complementarity::pivoting::all_solutions;
-///
-/// // w = −z + 1 has the solutions 0 and 1.
-/// let m = Dense::from_rows(&[[-1.0]]).expect("even rows");
-/// let found = all_solutions(&Lcp::new(m, vec![1.0])?, 100)?;
-/// let z: Vec<_> = found.isolated().map(|face| face.z[0]).collect();
-/// assert_eq!((z, found.complete), (vec![0.0, 1.0], true));
-///
-/// // z₁ + z₂ = 1 is a family, a segment.
-/// let m = Dense::from_rows(&[[1.0, 1.0], [1.0, 1.0]]).expect("even rows");
-/// let found = all_solutions(&Lcp::new(m, vec![-1.0, -1.0])?, 100)?;
-/// let family = found.families().next().expect("a family");
-/// assert_eq!((found.faces.len(), family.dimension, family.ends.len()), (1, 1, 2));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-///
-/// Errors: an operator, more than 40 pairs.
-pub fn all_solutions(problem: &impl Complementary, limit: usize) -> Result<Solutions, SolveError> {
-    let data = Data::new(&problem.rowwise(), 40)?;
-    let mut faces: Vec<Face> = vec![];
-    let mut open: Vec<Case> = Case::root(&data).into_iter().collect();
-    while let Some(case) = open.pop() {
-        if faces.len() >= limit {
-            return Ok(Solutions { faces: maximal(faces), complete: false });
-        }
-        match case.conflict(&data).or_else(|| case.undecided(&data)) {
-            None => faces.push(case.face(&data)),
-            Some(j) => {
-                let [first, last] = case.sides(&data, j);
-                open.extend([first, last].into_iter().filter_map(|s| case.without(&data, s).ok()));
-            }
-        }
-    }
-    Ok(Solutions { faces: maximal(faces), complete: true })
-}
-
-/// Without those that are contained in another; isolated ones first, in the order of z.
-fn maximal(faces: Vec<Face>) -> Vec<Face> {
-    let inside = |a: &Face, b: &Face| a.support.iter().zip(&b.allowed).all(|(s, a)| !s || *a);
-    let keep: Vec<bool> = (0..faces.len())
-        .map(|i| {
-            !(0..faces.len()).any(|k| {
-                k != i && inside(&faces[i], &faces[k]) && (k < i || !inside(&faces[k], &faces[i]))
-            })
-        })
-        .collect();
-    let kept = faces.into_iter().zip(keep).filter(|(_, keep)| *keep);
-    let mut faces: Vec<Face> = kept.map(|(face, _)| face).collect();
-    let earlier = |a: &Face, b: &Face| {
-        let first = a.z.iter().zip(&b.z).map(|(a, b)| a.total_cmp(b)).find(|o| o.is_ne());
-        a.dimension.cmp(&b.dimension).then(first.unwrap_or(std::cmp::Ordering::Equal))
-    };
-    faces.sort_by(earlier);
-    faces
-}
-
-/// Below this part of the largest number of a family, one is zero but for rounding.
-const DUST: f64 = 1e-14;
 /// What of an entry is zero, in units of the largest of its row.
 const ZERO: f64 = 1e-11;
 /// What of a value is zero, in units of its terms.
@@ -243,10 +146,10 @@ const NEGLIGIBLE: f64 = 1e-11;
 const STEEPEST: usize = 100;
 
 /// The problem as `Σ columns · x = q`, scaled: the residuals of equalities and w first (unit columns), then z and u.
-struct Data {
+pub(super) struct Data {
     equalities: usize,
     free: usize,
-    pairs: usize,
+    pub(super) pairs: usize,
     rows: usize,
     /// `rows × width`, by rows.
     columns: Vec<f64>,
@@ -257,7 +160,7 @@ struct Data {
 }
 
 impl Data {
-    fn new(mixed: &Rows, most: usize) -> Result<Self, SolveError> {
+    pub(super) fn new(mixed: &Rows, most: usize) -> Result<Self, SolveError> {
         let Rows { matrix, q, equalities, free, .. } = *mixed;
         if let Matrix::Operator(_) = matrix {
             return Err(SolveError::needs("the entries of M (dense or sparse)", "an operator"));
@@ -284,11 +187,11 @@ impl Data {
         self.rows + self.pairs + self.free
     }
 
-    fn w(&self, pair: usize) -> usize {
+    pub(super) fn w(&self, pair: usize) -> usize {
         self.equalities + pair
     }
 
-    fn z(&self, pair: usize) -> usize {
+    pub(super) fn z(&self, pair: usize) -> usize {
         self.rows + pair
     }
 
@@ -318,7 +221,7 @@ enum Basic {
 
 /// A case: some variables are not allowed; the tableau of a feasible basis.
 #[derive(Clone)]
-struct Case {
+pub(super) struct Case {
     /// `B⁻¹ [columns, q]`.
     t: Vec<f64>,
     b: Vec<f64>,
@@ -327,12 +230,18 @@ struct Case {
     basis: Vec<Basic>,
     /// Rows whose basic variable may have any value: free variables, and what says nothing.
     loose: Vec<bool>,
-    allowed: Vec<bool>,
+    pub(super) allowed: Vec<bool>,
+}
+
+/// A case without a point: this row of its tableau says that a positive number is the sum of nonpositive multiples of allowed variables.
+pub(super) struct Closed {
+    pub(super) case: Box<Case>,
+    row: usize,
 }
 
 impl Case {
-    /// The case where every z and w is allowed; or the vector that proves that there is no point.
-    fn root(data: &Data) -> Result<Self, Vec<f64>> {
+    /// The case where every z and w is allowed.
+    pub(super) fn root(data: &Data) -> Result<Self, Closed> {
         let (n, width) = (data.rows, data.width());
         let mut allowed = vec![true; width];
         allowed[..data.equalities].fill(false);
@@ -376,7 +285,7 @@ impl Case {
         // Artificial variables, one by one, while the rest stays feasible.
         for i in 0..n {
             if matches!(case.basis[i], Basic::Artificial(..)) && !case.loose[i] {
-                case.expel(data, i)?;
+                case = case.expelled(data, i)?;
             }
         }
         Ok(case)
@@ -452,8 +361,16 @@ impl Case {
         best
     }
 
-    /// Makes the basic variable of row i zero and takes it out of the basis; it must not be allowed. Or the vector that proves that it cannot be zero.
-    fn expel(&mut self, data: &Data, i: usize) -> Result<(), Vec<f64>> {
+    /// The case with the basic variable of row i, which must not be allowed, out of the basis.
+    fn expelled(mut self, data: &Data, i: usize) -> Result<Self, Closed> {
+        match self.expel(data, i) {
+            true => Ok(self),
+            false => Err(Closed { case: Box::new(self), row: i }),
+        }
+    }
+
+    /// Makes the basic variable of row i zero and takes it out of the basis; it must not be allowed. False where the row proves that it cannot be zero.
+    fn expel(&mut self, data: &Data, i: usize) -> bool {
         let width = data.width();
         for round in 0.. {
             let least = self.threshold(width, i);
@@ -475,83 +392,49 @@ impl Case {
                 if zero {
                     // The row says 0 = 0.
                     (self.loose[i], self.b[i]) = (true, 0.0);
-                    return Ok(());
                 }
-                return Err(self.proof(data, i));
+                return zero;
             };
             if zero {
                 self.pivot(width, i, j);
-                return Ok(());
+                return true;
             }
             // Row i blocks, if no other.
-            let Some((k, _)) = self.block(width, j, i) else { return Err(self.proof(data, i)) };
+            let Some((k, _)) = self.block(width, j, i) else { return false };
             self.pivot(width, k, j);
             if k == i || round > 10_000 {
                 break;
             }
         }
-        Ok(())
-    }
-
-    /// Row i says that a positive number is the sum of nonpositive multiples of allowed variables: y with `yᵀ columns_j ≥ 0` for those, `yᵀ q < 0`.
-    fn proof(&self, data: &Data, i: usize) -> Vec<f64> {
-        let (n, width) = (data.rows, data.width());
-        let mut y: Vec<f64> = (0..n).map(|k| -self.t[i * width + k]).collect();
-        // Bᵀ y = −e_i, refined.
-        for _ in 0..3 {
-            let missing: Vec<f64> = (0..n)
-                .map(|r| {
-                    let mut sum = Compensated::from(if r == i { -1.0 } else { 0.0 });
-                    match self.basis[r] {
-                        Basic::Artificial(k, sign) => sum.add(-sign * y[k]),
-                        Basic::Column(c) => {
-                            data.column(c).zip(&y).for_each(|(a, y)| sum.add_product(-a, *y));
-                        }
-                    }
-                    sum.value()
-                })
-                .collect();
-            for (k, y) in y.iter_mut().enumerate() {
-                *y += (0..n).map(|r| self.t[r * width + k] * missing[r]).sum::<f64>();
-            }
-        }
-        let largest = y.iter().fold(0.0_f64, |l, y| l.max(y.abs()));
-        for (k, y) in y.iter_mut().enumerate() {
-            let must = self.allowed[k];
-            if y.abs() <= 1e-13 * largest || (must && *y < 0.0) {
-                *y = 0.0;
-            }
-            *y *= data.row_scale[k];
-        }
-        y
+        true
     }
 
     /// A pair whose z and w are both positive: the one with the largest lesser of them.
-    fn conflict(&self, data: &Data) -> Option<usize> {
+    pub(super) fn conflict(&self, data: &Data) -> Option<usize> {
         let lesser = |j: usize| self.value(data.w(j)).min(self.value(data.z(j)));
         let worst = (0..data.pairs).map(|j| (lesser(j), j)).max_by(|a, b| a.0.total_cmp(&b.0));
         worst.filter(|(x, _)| *x > 0.0).map(|(_, j)| j)
     }
 
     /// A pair whose z and w are both allowed.
-    fn undecided(&self, data: &Data) -> Option<usize> {
+    pub(super) fn undecided(&self, data: &Data) -> Option<usize> {
         (0..data.pairs).find(|j| self.allowed[data.w(*j)] && self.allowed[data.z(*j)])
     }
 
     /// The two columns of a pair, the one to be tried last first: the lesser value goes.
-    fn sides(&self, data: &Data, j: usize) -> [usize; 2] {
+    pub(super) fn sides(&self, data: &Data, j: usize) -> [usize; 2] {
         let (w, z) = (data.w(j), data.z(j));
         if self.value(w) < self.value(z) { [z, w] } else { [w, z] }
     }
 
-    /// The case where a column is not allowed either; or the vector that proves that it has no point.
-    fn without(&self, data: &Data, column: usize) -> Result<Self, Vec<f64>> {
+    /// The case where a column is not allowed either.
+    pub(super) fn without(&self, data: &Data, column: usize) -> Result<Self, Closed> {
         let mut case = self.clone();
         case.allowed[column] = false;
-        if let Some(i) = case.row_of(column) {
-            case.expel(data, i)?;
+        match case.row_of(column) {
+            Some(i) => case.expelled(data, i),
+            None => Ok(case),
         }
-        Ok(case)
     }
 
     /// The values of all columns at the basis, refined against the data.
@@ -599,132 +482,61 @@ impl Case {
     fn point(&self, data: &Data) -> Vec<f64> {
         data.unscaled(&self.values(data))
     }
-
-    /// Everything that solves a case in which all pairs are decided.
-    fn face(&self, data: &Data) -> Face {
-        let (n, width) = (data.rows, data.width());
-        let (mut ends, mut rays) = (vec![self.values(data)], vec![]);
-        // Each variable that can be positive, at its largest.
-        for column in self.candidates().chain((0..width).filter(|j| self.row_of(*j).is_some())) {
-            if !self.allowed[column] {
-                continue;
-            }
-            let mut case = self.clone();
-            if let Some(ray) = case.grow(data, column) {
-                rays.push(ray);
-            }
-            ends.push(case.values(data));
-        }
-        let scale = ends.iter().flatten().fold(0.0_f64, |l, x| l.max(x.abs()));
-        // Where nothing but zero ends it, rays have any length.
-        let scale = if scale > 0.0 { scale } else { 1.0 };
-        // What rounding leaves of a zero is none.
-        for x in ends.iter_mut().flatten().filter(|x| x.abs() <= DUST * scale) {
-            *x = 0.0;
-        }
-        let mean = |j: usize| {
-            let points: f64 = ends.iter().map(|x| x[j]).sum::<f64>() / ends.len() as f64;
-            points + rays.iter().map(|x: &Vec<f64>| x[j] * scale).sum::<f64>()
-        };
-        let middle: Vec<f64> = (0..width).map(mean).collect();
-        let support: Vec<bool> = (0..width)
-            .map(|j| j >= n + data.pairs || (self.allowed[j] && middle[j] > 1e-10 * scale))
-            .collect();
-        let columns: Vec<usize> = (0..width).filter(|j| support[*j]).collect();
-        let dimension = columns.len() - rank(data, &columns);
-        let mut distinct: Vec<Vec<f64>> = vec![];
-        let add = |x: Vec<f64>, list: &mut Vec<Vec<f64>>| {
-            let near = |y: &Vec<f64>| x.iter().zip(y).all(|(x, y)| (x - y).abs() <= 1e-9 * scale);
-            if !list.iter().any(near) {
-                list.push(x);
-            }
-        };
-        ends.iter().cloned().for_each(|x| add(x, &mut distinct));
-        let mut directions: Vec<Vec<f64>> = vec![];
-        rays.iter().cloned().for_each(|x| add(x, &mut directions));
-        let z = if dimension == 0 { ends[0].clone() } else { middle };
-        let (ends, rays) = if dimension == 0 { (vec![], vec![]) } else { (distinct, directions) };
-        Face {
-            z: data.unscaled(&z),
-            dimension,
-            ends: ends.iter().map(|x| data.unscaled(x)).collect(),
-            rays: rays.iter().map(|x| data.unscaled(x)).collect(),
-            // A free variable is never an obstacle.
-            allowed: (0..width).map(|j| self.allowed[j] || j >= n + data.pairs).collect(),
-            support,
-        }
-    }
-
-    /// Makes a variable as large as it gets; the direction, where there is no largest.
-    fn grow(&mut self, data: &Data, column: usize) -> Option<Vec<f64>> {
-        let width = data.width();
-        for round in 0..10_000 {
-            let entering = match self.row_of(column) {
-                None => Some(column),
-                Some(i) => {
-                    let least = self.threshold(width, i);
-                    let slope = |j: &usize| -self.t[i * width + j];
-                    let mut growing = self.candidates().filter(|j| slope(j) > least);
-                    if round < STEEPEST {
-                        growing.max_by(|a, b| slope(a).total_cmp(&slope(b)))
-                    } else {
-                        growing.next()
-                    }
-                }
-            };
-            let j = entering?;
-            match self.block(width, j, usize::MAX) {
-                Some((k, _)) => self.pivot(width, k, j),
-                None => {
-                    let mut ray = vec![0.0; width];
-                    ray[j] = 1.0;
-                    for (i, basic) in self.basis.iter().enumerate() {
-                        if let Basic::Column(k) = basic {
-                            let slope = self.t[i * width + j];
-                            let zero = slope.abs() <= self.threshold(width, i);
-                            ray[*k] = if zero { 0.0 } else { -slope };
-                        }
-                    }
-                    let largest = ray.iter().fold(0.0_f64, |l, x| l.max(x.abs()));
-                    ray.iter_mut().for_each(|x| *x /= largest);
-                    return Some(ray);
-                }
-            }
-        }
-        None
-    }
 }
 
-/// The rank of some columns, by complete pivoting.
-fn rank(data: &Data, columns: &[usize]) -> usize {
-    let mut a: Vec<Vec<f64>> = columns.iter().map(|&j| data.column(j).collect()).collect();
-    let mut used = vec![false; data.rows];
-    let mut rank = 0;
-    let mut first = 0.0;
-    while rank < a.len() {
-        let mut best = (0.0, 0, 0);
-        for (k, column) in a.iter().enumerate().skip(rank) {
-            for (i, x) in column.iter().enumerate().filter(|(i, _)| !used[*i]) {
-                if x.abs() > best.0 {
-                    best = (x.abs(), k, i);
-                }
+impl Closed {
+    /// The vector that proves it, up to rounding: y with `yᵀ columns_j ≥ 0` for allowed columns, `yᵀ q < 0`.
+    fn proof(&self, data: &Data) -> Vec<f64> {
+        let Self { case, row: i } = self;
+        let (n, width) = (data.rows, data.width());
+        let mut y: Vec<f64> = (0..n).map(|k| -case.t[i * width + k]).collect();
+        // Bᵀ y = −e_i, refined.
+        for _ in 0..3 {
+            let missing: Vec<f64> = (0..n)
+                .map(|r| {
+                    let mut sum = Compensated::from(if r == *i { -1.0 } else { 0.0 });
+                    match case.basis[r] {
+                        Basic::Artificial(k, sign) => sum.add(-sign * y[k]),
+                        Basic::Column(c) => {
+                            data.column(c).zip(&y).for_each(|(a, y)| sum.add_product(-a, *y));
+                        }
+                    }
+                    sum.value()
+                })
+                .collect();
+            for (k, y) in y.iter_mut().enumerate() {
+                *y += (0..n).map(|r| case.t[r * width + k] * missing[r]).sum::<f64>();
             }
         }
-        let (x, k, i) = best;
-        if rank == 0 {
-            first = x;
+        let largest = y.iter().fold(0.0_f64, |l, y| l.max(y.abs()));
+        for (k, y) in y.iter_mut().enumerate() {
+            let must = case.allowed[k];
+            if y.abs() <= 1e-13 * largest || (must && *y < 0.0) {
+                *y = 0.0;
+            }
+            *y *= data.row_scale[k];
         }
-        if x <= 1e-10 * first || x == 0.0 {
-            break;
-        }
-        a.swap(rank, k);
-        used[i] = true;
-        let pivot = a[rank].clone();
-        for column in &mut a[rank + 1..] {
-            let factor = column[i] / pivot[i];
-            column.iter_mut().zip(&pivot).for_each(|(c, p)| *c -= factor * p);
-        }
-        rank += 1;
+        y
     }
-    rank
+
+    /// A vector that proves it whatever is lost by rounding: `yᵀ columns_j` is positive of basic columns too, where a [`proof`](Self::proof) has zeros. `None` where
+    /// other columns leave no room for that, and with free variables, which want zeros.
+    pub(super) fn strict_proof(&self, data: &Data) -> Option<Vec<f64>> {
+        if data.free > 0 {
+            return None;
+        }
+        let Self { case, row: i } = self;
+        let (n, width) = (data.rows, data.width());
+        let allowed = |r: &usize| matches!(case.basis[*r], Basic::Column(j) if case.allowed[j]);
+        let raised: Vec<usize> = (0..n).filter(allowed).collect();
+        let slope = |j: usize| -case.t[i * width + j];
+        let change = |j: usize| raised.iter().map(|r| case.t[r * width + j]).sum::<f64>();
+        let value = raised.iter().map(|r| case.b[*r]).sum::<f64>();
+        let room =
+            |has: f64, loses: f64| if loses > 0.0 { 0.5 * has / loses } else { f64::INFINITY };
+        let rooms = case.candidates().map(|j| room(slope(j), -change(j)));
+        let step = rooms.fold(room(case.b[*i], value).min(1.0), f64::min);
+        let y = |k: usize| (slope(k) + step * change(k)) * data.row_scale[k];
+        (step > 0.0).then(|| (0..n).map(y).collect())
+    }
 }

@@ -15,6 +15,7 @@
 //! Fails: exponentially many pivots at worst; equilibria that no label reaches from the artificial one.
 
 use nonsmooth_linalg::Dense;
+use nonsmooth_problem::check::Certificate;
 use nonsmooth_problem::{Lcp, LcpPoint};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -23,6 +24,7 @@ use super::basis::{Basis, Data, Factored, Tableau};
 use super::path::{Breaking, End, Event, Exchange, Path};
 use crate::complementarity::form::{Bounded, Complementary, system};
 use crate::complementarity::parts::game::{Equilibrium, Game};
+use crate::complementarity::parts::refuting_row;
 use crate::core::register::{About, Described, Solves};
 use crate::core::settings::{Settings, described};
 use crate::core::trace::{Pivot, Recorder, Trace, Variable};
@@ -158,6 +160,8 @@ pub struct LemkeHowsonWork {
     begun: bool,
     pivots: usize,
     z: Option<Vec<f64>>,
+    /// A row that refutes the problem.
+    refuting: Option<usize>,
     record: Recorder<Pivot>,
 }
 
@@ -170,9 +174,8 @@ impl LemkeHowsonWork {
         self.begun = false;
         match self.tried < labels {
             true => Step::Continue { estimate: f64::NAN },
-            false => {
-                Step::Stuck("no label leads to an equilibrium: rounding spoils all paths".into())
-            }
+            // An equilibrium in which a player has nothing to pay is no solution, and rounding may spoil a path.
+            false => Step::Stuck("no label leads to an equilibrium that is a solution".into()),
         }
     }
 
@@ -189,7 +192,9 @@ impl<P: Complementary> Solver<P> for LemkeHowson {
     fn work(&self, problem: &P) -> Result<LemkeHowsonWork, SolveError> {
         let none =
             || SolveError::needs("a bimatrix game (see `nonsmooth list`)", "another problem");
-        let game = Game::of(&problem.system()?).ok_or_else(none)?;
+        let system = problem.system()?;
+        let game = Game::of(&system).ok_or_else(none)?;
+        let refuting = refuting_row(&system, &mut vec![]);
         let (a, b) = game.payoffs();
         let walk = Walk::new(&a, &b)?;
         let labels = walk.path.data.n;
@@ -205,6 +210,7 @@ impl<P: Complementary> Solver<P> for LemkeHowson {
             begun: false,
             pivots: 0,
             z: None,
+            refuting,
             record: Recorder::default(),
         })
     }
@@ -215,6 +221,9 @@ impl<P: Complementary> Solver<P> for LemkeHowson {
     }
 
     fn step(&self, problem: &P, _: &mut LcpPoint, work: &mut LemkeHowsonWork) -> Step {
+        if let Some(row) = work.refuting {
+            return Step::NoSolution(Certificate::Row { row });
+        }
         if !work.begun {
             if work.walk.begin(work.label).is_err() {
                 return work.next();

@@ -263,7 +263,6 @@ impl<const D: usize> OnContacts<Auto, D> {
         let mut apart = before.unwrap_or_else(|| Box::new(Apart::new(groups, all)));
         let whole = apart.largest as f64 > LARGEST * all as f64;
         if !whole {
-            apart.restart();
             self.begin_round(problem, point, work, &mut apart);
             work.stage = Stage::Apart;
         }

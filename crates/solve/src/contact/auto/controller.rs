@@ -166,7 +166,8 @@ impl Controller {
     fn record(&mut self, error: f64) -> bool {
         let as_good = error <= AS_GOOD * self.least;
         self.least = error.min(self.least);
-        if error <= self.halved {
+        // An error of zero that the judge does not believe cannot be halved.
+        if error <= self.halved && self.halved > 0.0 {
             (self.halved, self.spent, self.idle) = (0.5 * error, 0.0, 0);
             self.budget = PATIENT;
         }
@@ -309,6 +310,18 @@ mod tests {
         assert!(!controller.end(Verdict::Solved, 2.5e-4));
         assert!(!controller.end(Verdict::Failed, f64::NAN));
         assert_eq!(controller.least(), 1e-4);
+    }
+
+    #[test]
+    fn an_error_of_zero_is_stuck_like_any_other() {
+        let mut controller = Controller::default();
+        controller.begin(1e-3);
+        let iterations = (0..2000).take_while(|_| {
+            controller.observe(&Inner { residual: 0.0, step: 1.0 });
+            controller.end(Verdict::Solved, 0.0);
+            !controller.is_stuck()
+        });
+        assert!(iterations.count() < 400);
     }
 
     #[test]

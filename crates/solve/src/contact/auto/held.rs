@@ -8,7 +8,7 @@
 //! the last one alone gets it (Murty1974: this ends where all is linear and the matrix is P).
 //!
 //! Cost: a solve of the rest for each set, of which a handful are tried. Storage: the problem of the rest and its workspace.
-//! Fails: where the rows that are let go contradict each other, or nothing solves the rest; sweeps then go on.
+//! Fails: where the rows that are let go contradict each other, or nothing solves the rest; then it is asked whether there is a solution at all, and sweeps go on.
 
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::check::Kinematic;
@@ -46,7 +46,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         let few = work.rate.left(work.tolerance) * (SWEEPS_A_STEP as f64) < SWEEPS_WITH_ROWS;
         if lost && work.done.searches > 0 {
             let Some([r, lambda]) = work.searched_from.take() else {
-                return Step::Stuck("sweeps send the impulses to infinity".into());
+                let asked = self.ask(problem, point, work);
+                let stuck = || Step::Stuck("sweeps send the impulses to infinity".into());
+                return asked.unwrap_or_else(stuck);
             };
             let to = P::all_impulses(point);
             to.0.copy_from_slice(&r);
@@ -60,7 +62,15 @@ impl<const D: usize> OnContacts<Auto, D> {
             r.fill(0.0);
             lambda.fill(0.0);
             put_within_bounds(problem, point);
-        } else if work.done.sweeps < work.hold_after || few || estimate == 0.0 {
+        } else if estimate == 0.0 {
+            // Where nothing moves any more and the judge goes on asking, sweeps are at their end.
+            if let Some(step) = self.ask(problem, point, work) {
+                return step;
+            }
+            if work.done.searches > 0 {
+                return Step::Stuck("sweeps move nothing any more".into());
+            }
+        } else if work.done.sweeps < work.hold_after || few {
             return Step::Continue { estimate };
         }
         work.done.searches += 1;
@@ -99,9 +109,24 @@ impl<const D: usize> OnContacts<Auto, D> {
                 work.held = None;
                 work.stage = FIRST;
                 work.rate.begin();
-                Step::Continue { estimate: f64::NAN }
+                let asked = self.ask(problem, point, work);
+                asked.unwrap_or(Step::Continue { estimate: f64::NAN })
             }
         }
+    }
+
+    /// Whether there is a solution at all, asked once where a search ended in vain: what follows from that, if something does.
+    fn ask<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        point: &mut P::Point,
+        work: &mut HybridWork<P, D>,
+    ) -> Option<Step> {
+        if std::mem::replace(&mut work.asked, true) {
+            return None;
+        }
+        let existence = self.investigated(problem, work);
+        self.decided(problem, point, work, &existence)
     }
 }
 

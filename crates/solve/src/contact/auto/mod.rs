@@ -142,6 +142,11 @@ const SWEEPS_WORTH_SPREAD: f64 = 10.0;
 const NEAR: f64 = 1e-4;
 /// Above this error between two proximal steps, sweeps.
 const SWEEP_ABOVE: f64 = 1e-9;
+/// Below it only where so many subproblems in a row have ended within the tolerance and the judge goes on asking: single contacts, whose loads are too small beside those of others for the error to show
+/// them, are not done. What a linear solve makes of them is the rounding of the others; sweeps solve each in its own unit. Each time twice as many.
+const REFUSED: u32 = 3;
+/// Doublings, at most.
+const DOUBLED: u32 = 8;
 /// ω of the sweeps with one projection a contact, as that of `psor`.
 const OMEGA: f64 = 1.3;
 /// Sweeps that raise the error by more than this factor are taken back.
@@ -211,6 +216,8 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     passed_by: Option<PassedBy>,
     /// Alternating directions last began at the point, not at no impulses.
     from_here: bool,
+    /// Subproblems in a row that ended within the tolerance and were not enough.
+    refused: u32,
     done: Done,
 }
 
@@ -316,6 +323,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send, const D: us
             turned: false,
             passed_by: None,
             from_here: false,
+            refused: 0,
             done: Done::default(),
             state,
         })
@@ -467,7 +475,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work.doubted = false;
         (work.passed_by, work.rest, work.spread) = (None, RestSearch::default(), None);
         (work.turned, work.in_turn) = (false, None);
-        work.cadoux_after = 0;
+        (work.cadoux_after, work.refused) = (0, 0);
         work.parted = false;
         if let Some(apart) = &mut work.apart {
             apart.restart();
@@ -769,10 +777,12 @@ impl<const D: usize> OnContacts<Auto, D> {
             }
         }
         problem.enter(&mut work.state, point);
-        if error > SWEEP_ABOVE {
+        work.refused = if error <= work.tolerance { work.refused + 1 } else { 0 };
+        if error > SWEEP_ABOVE || work.refused >= REFUSED {
             let costs = work.costs(problem);
             let left = work.controller.sweeps(costs.worth / costs.sweep);
-            work.begin_between(point, left);
+            let doubled = work.refused.saturating_sub(REFUSED).min(DOUBLED);
+            work.begin_between(point, left << doubled);
         } else {
             self.subproblem(problem, point, work, error);
         }
@@ -805,7 +815,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let r = P::impulses(point);
         let error = newton.look(problem, &mut work.state, r);
         let factor = work.controller.swept(error);
-        if factor > TAKE_BACK || factor.is_nan() {
+        if factor > TAKE_BACK && error > work.tolerance || factor.is_nan() {
             r.copy_from_slice(&work.before);
             self.subproblem_here(problem, point, work);
         } else {
@@ -845,6 +855,17 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
+    /// Whether there is a solution, asked once.
+    fn investigated<P: Linearised<D> + Disked<D> + Kinematic<D>>(
+        &self,
+        problem: &P,
+        work: &mut HybridWork<P, D>,
+    ) -> Existence {
+        let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
+        let decide = || existence::decide::<P, D>(problem, &limits);
+        work.existence.get_or_insert_with(decide).clone()
+    }
+
     /// What follows from what is known of the existence of a solution, if something does.
     fn decided<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
@@ -863,7 +884,8 @@ impl<const D: usize> OnContacts<Auto, D> {
                 let exact = problem.assembled(&x);
                 P::copy_point(&exact, point);
                 problem.enter(&mut work.state, point);
-                work.best.copy_from_slice(P::impulses(point));
+                work.best.clear();
+                work.best.extend_from_slice(P::impulses(point));
                 self.subproblem_here(problem, point, work);
                 work.exact = Some(exact);
                 Some(Step::Continue { estimate: 0.0 })
@@ -883,11 +905,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             work.cadoux_after = work.done.strategies + 1;
             return self.begin_cadoux(problem, work);
         }
-        let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
-        let existence = work
-            .existence
-            .get_or_insert_with(|| existence::decide::<P, D>(problem, &limits))
-            .clone();
+        let existence = self.investigated(problem, work);
         if work.done.strategies == 0 && !work.asked {
             if let Some(step) = self.decided(problem, point, work, &existence) {
                 work.done.strategies += 1;

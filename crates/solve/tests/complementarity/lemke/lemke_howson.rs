@@ -116,3 +116,27 @@ fn games_are_recognised_and_solved_as_problems() {
     let said = by("lemke_howson").run(&spd).unwrap_err().to_string();
     assert!(said.contains("a bimatrix game"), "{said}");
 }
+
+/// Strategies that cost nothing by their own row, or by those of the other player.
+#[test]
+fn zero_rows_and_columns_are_part_of_a_game() {
+    use nonsmooth_problem::Lcp;
+    use nonsmooth_solve::{Solve, Status};
+    let solve = |rows: &[[f64; 5]; 5]| {
+        let lcp = Lcp::new(Dense::from_rows(rows).unwrap(), vec![-1.0; 5]).unwrap();
+        Solve::new().solver("lemke_howson").run(&lcp).unwrap()
+    };
+    let mut rows = [
+        [0.0, 0.0, 2.0, 1.0, 0.0],
+        [3.0, 0.0, 0.0, 0.0, 0.0],
+        [3.0, 0.0, 0.0, 0.0, 0.0],
+        [2.0, 0.0, 0.0, 0.0, 0.0],
+        [3.0, 0.0, 0.0, 0.0, 0.0],
+    ];
+    let answer = solve(&rows);
+    assert_eq!(answer.status, Status::Solved, "{:?}", answer.account);
+    // A strategy that costs nothing whatever the other player does cannot cost 1.
+    rows[1] = [0.0; 5];
+    rows[0][1] = 1.0;
+    assert!(matches!(solve(&rows).status, Status::Infeasible(_)));
+}

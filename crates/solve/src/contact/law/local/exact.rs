@@ -14,9 +14,8 @@
 //! [`Quartic`](super::Quartic)); JourdanAlartJean1998 for the block Gauss–Seidel that it serves.
 
 use crate::contact::law::Coulomb;
-use nonsmooth_linalg::small::mul;
 
-use super::{LocalSolver, inverse_or_regularised};
+use super::{LocalSolver, Rest};
 
 /// Solves to rounding, so there is nothing to set; each visit begins from the last one's root.
 #[derive(Debug, Clone, Copy, Default)]
@@ -25,7 +24,7 @@ pub struct Exact;
 /// What depends on the block alone, and the sliding parameter of the last visit.
 #[derive(Debug, Clone)]
 pub struct ExactMemo<const D: usize> {
-    inverse: Option<[[f64; D]; D]>,
+    rest: Option<Rest<D>>,
     schur: Option<Schur>,
     alpha: f64,
 }
@@ -35,7 +34,7 @@ impl<const D: usize> LocalSolver<D> for Exact {
 
     fn prepare(&self, w: &[[f64; D]; D], _: Coulomb) -> ExactMemo<D> {
         let schur = if D == 3 { Schur::new(w) } else { None };
-        ExactMemo { inverse: inverse_or_regularised(w), schur, alpha: 0.0 }
+        ExactMemo { rest: Rest::new(w), schur, alpha: 0.0 }
     }
 
     #[inline(always)]
@@ -51,20 +50,25 @@ impl<const D: usize> LocalSolver<D> for Exact {
         if q[0] >= 0.0 {
             return [0.0; D];
         }
-        let Some(inverse) = &memo.inverse else {
+        let Some(rest) = &memo.rest else {
             return *r;
         };
-        if let Some(stuck) = stick(inverse, q, mu) {
+        if let Some(stuck) = stick(rest, w, q, mu) {
             return stuck;
         }
         let sliding = if D == 2 {
             slide_plane(w, q, mu)
         } else {
-            memo.schur.as_ref().and_then(|schur| {
-                let (r, alpha) = Sliding::new(schur, q, mu).root(memo.alpha)?;
-                memo.alpha = alpha;
-                Some(embed(r))
-            })
+            match &memo.schur {
+                Some(schur) => {
+                    let found = Sliding::new(schur, q, mu).root(memo.alpha);
+                    found.map(|(r, alpha)| {
+                        memo.alpha = alpha;
+                        embed(r)
+                    })
+                }
+                None => slide_free(w, q, mu),
+            }
         };
         sliding.unwrap_or(*r)
     }
@@ -73,11 +77,12 @@ impl<const D: usize> LocalSolver<D> for Exact {
 /// `r = −W⁻¹ q` if it lies in K.
 #[inline(always)]
 pub(super) fn stick<const D: usize>(
-    inverse: &[[f64; D]; D],
+    rest: &Rest<D>,
+    w: &[[f64; D]; D],
     q: &[f64; D],
     mu: f64,
 ) -> Option<[f64; D]> {
-    let r = mul(inverse, q).map(|x| -x);
+    let r = rest.impulse(w, q)?;
     let tangential: f64 = r[1..].iter().map(|x| x * x).sum();
     (r[0] > 0.0 && tangential <= (mu * r[0]) * (mu * r[0])).then_some(r)
 }
@@ -99,6 +104,21 @@ fn slide_plane<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], mu: f64) -> Opti
         }
     }
     best.map(|(r, _)| r)
+}
+
+/// The sliding contact whose tangential motion follows from the normal one (W̃ = 0): `u_T = q̃`, `r_T = −mu r_N q̃ / ‖q̃‖`, `u_N = 0`.
+#[cold]
+fn slide_free<const D: usize>(w: &[[f64; D]; D], q: &[f64; D], mu: f64) -> Option<[f64; D]> {
+    let mut along = [0.0; D];
+    for k in 1..D {
+        along[k] = w[k][0] * (q[0] / w[0][0]) - q[k];
+    }
+    let size = along.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let mut r = along.map(|x| mu * x / size);
+    r[0] = 1.0;
+    let n = -q[0] / (0..D).map(|k| w[0][k] * r[k]).sum::<f64>();
+    r = r.map(|x| n * x);
+    (n > 0.0 && r.iter().all(|x| x.is_finite())).then_some(r)
 }
 
 /// The elimination of `r_N` by `u_N = 0` from a 3×3 block.
@@ -365,6 +385,41 @@ mod tests {
             assert!(r.iter().all(|x| x.is_finite()), "{r:?}");
         }
         assert!(small::inverse(&[[0.0; 3]; 3]).is_none());
+    }
+
+    /// `W = Jᵀ J` with fewer rows than columns and a load that an impulse answers.
+    #[test]
+    fn singular_blocks_are_solved_to_rounding() {
+        fn check<const D: usize>(rows: &[[f64; D]]) {
+            let mut w = [[0.0; D]; D];
+            for i in 0..D {
+                for j in 0..D {
+                    w[i][j] = rows.iter().map(|row| row[i] * row[j]).sum();
+                }
+            }
+            for tangential in [0.0, 0.7, -0.4] {
+                let mut impulse = [0.0; D];
+                (impulse[0], impulse[1]) = (-1.6, tangential);
+                let q = small::mul(&w, &impulse);
+                for mu in [0.3, 1.0, 2.0] {
+                    let found = [
+                        residual(&Exact, &w, &q, mu),
+                        residual(&Quartic, &w, &q, mu),
+                        residual(&Newton::new(Disk::AlartCurnier), &w, &q, mu),
+                    ];
+                    assert!(found.iter().all(|r| *r < 1e-12), "{rows:?} {q:?} {mu}: {found:?}");
+                }
+            }
+        }
+        for row in [[2.0, -1.0], [1.0, -1.0], [1.0, 1.0], [1.0, 0.0]] {
+            check(&[row]);
+        }
+        for row in [[2.0, -1.0, 0.0], [1.0, -1.0, 0.0], [3.0, 0.1, 0.7]] {
+            check(&[row]);
+        }
+        check(&[[1.0, 1.0, 1.0], [0.0, 1.0, -1.0]]);
+        check(&[[1.0, 2.0, 0.0], [0.0, 0.0, 1.0]]);
+        check(&[[0.3, 0.7, 0.1], [0.9, -0.2, 0.6]]);
     }
 
     /// Contacts that once were answered wrongly, by origin.

@@ -6,7 +6,7 @@
 //!
 //! Source: AlartCurnier1991; Acary, lecture (88)–(96). Cost: about 150 flops a step, 2 to 5 steps.
 
-use nonsmooth_linalg::small::{self, mul};
+use nonsmooth_linalg::small;
 
 use super::{LocalSolver, norm_bound, velocity};
 use crate::contact::law::DiskLaw;
@@ -89,15 +89,22 @@ pub(super) fn newton<L: DiskLaw<D>, const D: usize>(
         if merit <= floor + 4.0 * f64::EPSILON * size(&r) {
             return Some(r);
         }
+        // B + A W: a row of A has entries along the normal and in its own disk.
         let mut jacobian = at.b;
-        for i in 0..D {
-            for j in 0..D {
-                for k in 0..D {
-                    jacobian[i][j] += at.a[i][k] * w[k][j];
+        for j in 0..D {
+            jacobian[0][j] += at.a[0][0] * w[0][j];
+        }
+        for disk in 0..L::DISKS {
+            for i in L::rows(disk) {
+                for j in 0..D {
+                    jacobian[i][j] += at.a[i][0] * w[0][j];
+                    for k in L::rows(disk) {
+                        jacobian[i][j] += at.a[i][k] * w[k][j];
+                    }
                 }
             }
         }
-        let step = mul(&small::inverse(&jacobian)?, &at.phi);
+        let step = small::solve(&jacobian, &at.phi)?;
         let mut length = 1.0;
         let mut trial = r;
         for _ in 0..HALVINGS {

@@ -8,17 +8,17 @@
 use nonsmooth_linalg::small;
 
 use super::exact::{Schur, Sliding, embed, stick};
-use super::{Exact, LocalSolver, inverse_or_regularised, modified_velocity};
+use super::{Exact, LocalSolver, Rest, modified_velocity};
 use crate::contact::law::{Coulomb, cone};
 
 /// The local solver that enumerates the roots of the quartic.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Quartic;
 
-/// The inverse of the block, and what [`Exact`] keeps (its closed form serves in the plane).
+/// The inverse of the block, and what [`Exact`] keeps (its closed forms serve in the plane and where nothing resists sliding).
 #[derive(Debug, Clone)]
 pub struct QuarticMemo<const D: usize> {
-    inverse: Option<[[f64; D]; D]>,
+    rest: Option<Rest<D>>,
     schur: Option<Schur>,
     exact: <Exact as LocalSolver<D>>::Memo,
 }
@@ -28,7 +28,7 @@ impl<const D: usize> LocalSolver<D> for Quartic {
 
     fn prepare(&self, w: &[[f64; D]; D], law: Coulomb) -> QuarticMemo<D> {
         let schur = if D == 3 { Schur::new(w) } else { None };
-        QuarticMemo { inverse: inverse_or_regularised(w), schur, exact: Exact.prepare(w, law) }
+        QuarticMemo { rest: Rest::new(w), schur, exact: Exact.prepare(w, law) }
     }
 
     fn solve(
@@ -46,11 +46,11 @@ impl<const D: usize> LocalSolver<D> for Quartic {
         if q[0] >= 0.0 {
             return [0.0; D];
         }
-        if let Some(stuck) = memo.inverse.as_ref().and_then(|inverse| stick(inverse, q, mu)) {
+        if let Some(stuck) = memo.rest.as_ref().and_then(|rest| stick(rest, w, q, mu)) {
             return stuck;
         }
         let Some(schur) = &memo.schur else {
-            return *r;
+            return Exact.solve(&mut memo.exact, w, q, law, r);
         };
         let sliding = Sliding::new(schur, q, mu);
         let (p, scale) = sliding.quartic();

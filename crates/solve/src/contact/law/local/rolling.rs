@@ -8,10 +8,8 @@
 //! With two disks the sliding parameters are two, so that no polynomial of one variable is left.
 //! W may be nonsymmetric. Source: AlartCurnier1991; Khobotov1987. Cost: 100 to 1000 flops where a disk binds.
 
-use nonsmooth_linalg::small::mul;
-
 use super::newton::{newton, radii};
-use super::{LocalSolver, Newton, ProjectionIterated, inverse_or_regularised};
+use super::{LocalSolver, Newton, ProjectionIterated, Rest};
 use crate::contact::law::Rolling;
 use crate::contact::law::cfun::{Disk, Radii};
 use crate::contact::law::cone::ConvexSet;
@@ -23,7 +21,7 @@ pub struct RollingExact;
 /// What depends on the block alone, and the step length of the projections.
 #[derive(Debug, Clone)]
 pub struct RollingMemo<const D: usize> {
-    inverse: Option<[[f64; D]; D]>,
+    rest: Option<Rest<D>>,
     rho: Option<Radii>,
     step: f64,
 }
@@ -33,7 +31,7 @@ impl<const D: usize> LocalSolver<D, Rolling> for RollingExact {
 
     fn prepare(&self, w: &[[f64; D]; D], law: Rolling) -> RollingMemo<D> {
         let step = ProjectionIterated::default().prepare(w, law);
-        RollingMemo { inverse: inverse_or_regularised(w), rho: radii::<Rolling, D>(w), step }
+        RollingMemo { rest: Rest::new(w), rho: radii::<Rolling, D>(w), step }
     }
 
     fn solve(
@@ -47,7 +45,7 @@ impl<const D: usize> LocalSolver<D, Rolling> for RollingExact {
         if q[0] >= 0.0 {
             return [0.0; D];
         }
-        let rest = memo.inverse.as_ref().map(|inverse| mul(inverse, q).map(|x| -x));
+        let rest = memo.rest.as_ref().and_then(|rest| rest.impulse(w, q));
         if let Some(rest) = rest.filter(|rest| rest[0] > 0.0 && law.project(rest) == *rest) {
             return rest;
         }
@@ -80,7 +78,7 @@ mod tests {
                 let q: [f64; 5] = small::block(&problem.q, c);
                 let mut memo = RollingExact.prepare(&w, law);
                 let r = RollingExact.solve(&mut memo, &w, &q, law, &[0.0; 5]);
-                let mut u = mul(&w, &r);
+                let mut u = small::mul(&w, &r);
                 (0..5).for_each(|k| u[k] += q[k]);
                 u[0] += law.shift(&u);
                 let unit = small::mean_diagonal(&w);
