@@ -756,7 +756,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                     P::copy_point(self.judge.tidied, point);
                 }
                 // A projection that the limit cut short says nothing of a point that was judged before.
-                if measure.merit().is_finite() { measure } else { self.judge.best_measure }
+                let cut_short = budget::over() && measure.merit() >= f64::MAX;
+                if cut_short { self.judge.best_measure } else { measure }
             }
         };
         // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
@@ -1035,7 +1036,7 @@ impl<'a, P: Problem> Judge<'a, P> {
         };
         // What passes counts as the best, though its merit may be that of a point with a contact that is not done.
         let mut better = self.last.merit().is_finite()
-            && (self.latest
+            && (self.latest && !(budget::over() && self.last.merit() >= f64::MAX)
                 || self.last.is_better_than(&self.best_measure)
                 || self.last.passes(tolerance));
         // Residuals may be finite where an impulse that nothing feels is not.

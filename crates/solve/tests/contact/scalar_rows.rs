@@ -47,6 +47,37 @@ fn planted_problems_are_solved_in_every_form() {
     }
 }
 
+/// A motor holds a part 2²⁷ times lighter than the body that the contact carries: sweeps think that they have arrived, relative to what the part would do without the motor.
+#[test]
+fn what_a_motor_holds_is_no_measure_of_a_contact() {
+    let m = 2f64.powi(-27);
+    let h = Csc::from_triplets(2, 2, [(0, 0, 1.0), (1, 0, 1.0)].into_iter()).unwrap();
+    let g = Csc::from_triplets(2, 1, [(0, 0, 1.0)].into_iter()).unwrap();
+    let f = vec![1.0, -1.0];
+    let mut problem =
+        FrictionGlobal::<2>::new(Csc::diagonal(&[m, 1.0]), h, f, vec![0.0; 2], vec![0.0]).unwrap();
+    let bounds = Bounds { lower: vec![-4.0], upper: vec![4.0] };
+    problem.rows = Some(RowsGlobal { G: g, b: vec![0.0], bounds });
+    let answer = Solve::new().max_iterations(100_000).run(&problem).unwrap();
+    assert_eq!(answer.status, Status::Solved, "{:?} {:?}", answer.account, answer.verdict.measure);
+    assert!((answer.point.r[0] - 1.0).abs() < 1e-6, "{:?}", answer.point);
+}
+
+/// A limit that a contact contradicts: one search, then the proof.
+#[test]
+fn rows_without_a_solution_are_asked_for_its_existence() {
+    let h = Csc::from_triplets(1, 2, [(0, 0, 1.0)].into_iter()).unwrap();
+    let g = Csc::from_triplets(1, 1, [(0, 0, -1.0)].into_iter()).unwrap();
+    let w = vec![-1.0, 0.0];
+    let mut problem =
+        FrictionGlobal::<2>::new(Csc::diagonal(&[1.0]), h, vec![0.0], w, vec![0.3]).unwrap();
+    // v ≥ 1 of the contact, v ≤ 0 of the row.
+    let bounds = Bounds { lower: vec![0.0], upper: vec![f64::INFINITY] };
+    problem.rows = Some(RowsGlobal { G: g, b: vec![0.0], bounds });
+    let answer = Solve::new().max_iterations(10_000).run(&problem).unwrap();
+    assert!(matches!(answer.status, Status::Infeasible(_)), "{:?}", answer.status);
+}
+
 /// Joints with motors and limits that nothing touches.
 #[test]
 fn rows_without_contacts_are_solved() {

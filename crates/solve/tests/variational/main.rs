@@ -272,6 +272,21 @@ fn what_has_no_answer_ends_with_a_reason() {
 }
 
 /// X without a point, or a direction d that leads to infinity in it with `F(x)ᵀd < 0` on the whole of it: proved, by multipliers in fractions where F is affine, by bounds of its terms else.
+/// The last point of a method that has no best one is judged when the time is over, where no projection comes to an end.
+#[test]
+fn a_limit_of_time_leaves_the_residuals_of_what_was_judged() {
+    let rows = ["x1+x2", "x1+x2-1", "x3"].map(String::from);
+    let plane = Csc::from_triplets(1, 3, [(0, 2, 1.0)].into_iter()).unwrap();
+    let set = Set::Polyhedron { A: Csc::zeros(0, 3), b: vec![], C: plane, d: vec![1.0] };
+    let problem = Vi::new(expressions(rows), set, vec![0.0; 3]).unwrap();
+    for name in ["fixed_point", "extragradient", "hyperplane"] {
+        let how = Solve::new().solver(name).max_iterations(usize::MAX).time_limit(0.1);
+        let answer = how.run(&problem).unwrap();
+        assert_eq!(answer.status, Status::Limit(Limit::Time), "{name}");
+        assert!(answer.verdict.measure.relative < 1.0, "{name} {:?}", answer.verdict.measure);
+    }
+}
+
 #[test]
 fn what_has_no_solution_is_proved_to_have_none() {
     let rows = |rows: &[&[f64]], rhs: &[f64]| {

@@ -70,7 +70,10 @@ impl<const D: usize> OnContacts<Auto, D> {
             if work.done.searches > 0 {
                 return Step::Stuck("sweeps move nothing any more".into());
             }
-        } else if work.done.sweeps < work.hold_after || few {
+        } else if work.done.sweeps < work.hold_after
+            || few && work.done.sweeps < AGAIN * work.hold_after
+        {
+            // Few promise to be left, and yet it may be that they never come to an end.
             return Step::Continue { estimate };
         }
         work.done.searches += 1;
