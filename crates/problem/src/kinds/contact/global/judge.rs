@@ -312,8 +312,6 @@ impl GlobalGauge {
         } else {
             imbalance(problem, (v, v_low), &point.r, lambda, force, rows)
         };
-        rows.start(&problem.w);
-        rows.add_transposed(&problem.H, v);
         let bounded = problem.rows.as_ref().filter(|b| !b.bounds.are_free());
         if let (Some(b), Some((free, scratch))) = (bounded, free) {
             rows.start(&problem.f);
@@ -323,9 +321,9 @@ impl GlobalGauge {
             rows.start(&problem.w);
             rows.add_transposed(&problem.H, &spare[..n]);
             law.measure_at(rows.norm());
-            rows.start(&problem.w);
-            rows.add_transposed(&problem.H, v);
         }
+        rows.start(&problem.w);
+        rows.add_transposed(&problem.H, v);
         let mut measure = if precisely {
             reach.update(problem, &law.w, &point.r, (v, lambda), &mut spare[..n]);
             rows.add_transposed(&problem.H, v_low);

@@ -109,27 +109,6 @@ impl LawGauge {
         }
     }
 
-    /// Raises the strength of those to which a neighbour that answers does more than they do to themselves: `√(W_cc |W_cj W_jc| / W_jj)`, and `|W_cj W_jc| / W_jj` where row j is `held`, whatever the
-    /// units of both. `[W, V; Vᵀ, R]` that is positive semidefinite has none: `|W_cj|² ≤ W_cc W_jj`.
-    pub(crate) fn raise(
-        &mut self,
-        each: impl FnOnce(&mut dyn FnMut(usize, usize, f64, &dyn Fn() -> f64)),
-        held: impl Fn(usize) -> bool,
-    ) {
-        let Self { strength, impulses: own, .. } = self;
-        own.clear();
-        own.extend_from_slice(strength);
-        each(&mut |i, j, a, back| {
-            if a / own[i] * (a / own[j]) > 4.0 {
-                let through = a * (back() / own[j]);
-                let stands = if held(j) { through } else { (own[i] * through).sqrt() };
-                if stands.is_finite() {
-                    strength[i] = strength[i].max(stands);
-                }
-            }
-        });
-    }
-
     /// What stands for w_c where contact c is measured by itself.
     pub(crate) fn own_w(&self, c: usize) -> f64 {
         match self.strength.get(c) {

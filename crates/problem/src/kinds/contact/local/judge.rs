@@ -81,7 +81,7 @@ impl LocalGauge {
         strength.extend((0..n).map(|i| all.entry(i, i)));
         if strength.contains(&0.0) {
             // Of an empty block what an impulse does through a neighbour, or the velocity that loads make over the impulse that answers them.
-            let (known, missing) = (impulses, |x: f64| x == 0.0);
+            let (known, missing) = (&mut *impulses, |x: f64| x == 0.0);
             known.clear();
             known.extend_from_slice(strength);
             all.each(|i, j, size| {
@@ -121,19 +121,26 @@ impl LocalGauge {
             !loads.are_joined()
         });
         loads.spread(amounts.iter().copied());
+        // A neighbour that answers may do more to a contact than that does to itself: √(W_cc |W_cj W_jc| / W_jj), and |W_cj W_jc| / W_jj where j is a free row, whatever the units of both.
+        // Not where [W, V; Vᵀ, R] is positive semidefinite: there |W_cj|² ≤ W_cc W_jj.
         let nc = problem.contacts();
-        let held = |j: usize| {
+        let is_free = |j: usize| {
             j >= nc && problem.rows.as_ref().is_some_and(|rows| rows.bounds.is_free(j - nc))
         };
-        self.law.raise(
-            |raise| {
-                all.each(|i, j, size| {
-                    raise(i, j, size(), &|| all.entry(j, i));
-                    true
-                });
-            },
-            held,
-        );
+        let own = impulses;
+        own.clear();
+        own.extend_from_slice(strength);
+        all.each(|i, j, size| {
+            let a = size();
+            if a / own[i] * (a / own[j]) > 4.0 {
+                let through = a * (all.entry(j, i) / own[j]);
+                let stands = if is_free(j) { through } else { (own[i] * through).sqrt() };
+                if stands.is_finite() {
+                    strength[i] = strength[i].max(stands);
+                }
+            }
+            true
+        });
     }
 
     /// Measures by the size of `q + V λ` at the point where rows have bounds.
