@@ -52,7 +52,8 @@ pub fn ticks(end: f64, n: usize, least: f64) -> Vec<f64> {
 /// Whole numbers from `low` to `high`, at most about `n` of them: the decades of a logarithmic axis.
 pub fn decades(low: f64, high: f64, n: usize) -> Vec<f64> {
     let step = ((high - low) / n as f64).ceil().max(1.0);
-    let first = (low / step).ceil() * step;
+    // What rounds up to zero has no sign.
+    let first = (low / step).ceil() * step + 0.0;
     let mut all = vec![];
     let mut at = first;
     while at <= high {
@@ -147,6 +148,7 @@ mod tests {
         assert_eq!(ticks(2.0, 8, 1.0), [0.0, 1.0, 2.0]);
         assert_eq!(decades(-9.0, 1.0, 10).len(), 11);
         assert_eq!(decades(-19.0, 1.0, 10)[0], -18.0);
+        assert!(decades(-0.5, 3.0, 9)[0].is_sign_positive());
         assert_eq!((tick(0.5), tick(40.0), tick(2e7)), ("0.5".into(), "40".into(), "2.0e7".into()));
     }
 

@@ -425,6 +425,8 @@ pub fn runs_table(runs: &Runs) -> Table {
 /// A number that reads back as it is, in the shorter of the two notations; nothing where it is not known.
 pub(crate) fn number(x: Option<f64>) -> String {
     x.map_or(String::new(), |x| {
+        // Zero has no sign.
+        let x = x + 0.0;
         let (plain, scientific) = (format!("{x}"), format!("{x:e}"));
         if scientific.len() < plain.len() { scientific } else { plain }
     })
@@ -433,7 +435,7 @@ pub(crate) fn number(x: Option<f64>) -> String {
 /// Three significant digits.
 pub(crate) fn significant(x: f64) -> String {
     if x == 0.0 || !x.is_finite() {
-        return format!("{x}");
+        return format!("{}", x + 0.0);
     }
     let digits = x.abs().log10().floor();
     match digits {

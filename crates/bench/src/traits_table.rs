@@ -225,6 +225,13 @@ pub enum DescribeError {
     },
 }
 
+impl DescribeError {
+    /// Whether the file is in order, but holds a problem without contacts.
+    pub fn is_of_another_kind(&self) -> bool {
+        matches!(self, Self::Io(IoError::NoContacts { .. }))
+    }
+}
+
 /// Reads the problem of a file and describes it, with its spectrum where the dense matrix has at most `limit` rows.
 pub fn describe(file: &Path, limit: usize) -> Result<Described, DescribeError> {
     let content = ProblemFile::read(file)?;

@@ -37,6 +37,7 @@ fn main() {
         shards_add_up_to_the_whole,
         a_plan_that_differs_is_refused,
         a_problem_that_changed_is_left_out,
+        a_further_folder_changes_no_name_that_is_there,
         a_journal_has_one_writer,
         files_of_another_version_are_refused_by_name,
         lines_survive_the_way_to_the_file_and_back,
@@ -354,6 +355,24 @@ fn a_problem_that_changed_is_left_out() {
     let runs = Runs::read(&file).unwrap();
     assert!(runs.problems["one/p0"].error.is_none());
     assert_eq!(runs.runs.len(), 6);
+}
+
+fn a_further_folder_changes_no_name_that_is_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("first");
+    problems(&folder, 2);
+    let file = dir.path().join("runs.jsonl");
+    let plan = plan(&["nsgs"]);
+    go_on(&folder, &file, &plan).unwrap();
+    // Another problem of the same family and name.
+    std::fs::create_dir_all(dir.path().join("second/one")).unwrap();
+    problem(&dir.path().join("second/one/p0.hdf5"), 7, 9);
+    let summary = go_on(dir.path(), &file, &plan).unwrap();
+    assert_eq!((summary.unreadable, summary.all, summary.new), (0, 6, 2));
+    let runs = Runs::read(&file).unwrap();
+    let names: Vec<_> = runs.problems.keys().map(String::as_str).collect();
+    assert_eq!(names, ["one/p0", "second/one/p0", "two/p1"]);
+    assert_eq!(go_on(dir.path(), &file, &plan).unwrap().new, 0);
 }
 
 fn a_journal_has_one_writer() {

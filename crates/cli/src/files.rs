@@ -226,12 +226,18 @@ pub fn ends_in(option: &str, path: &Path, extensions: &[&str]) -> Result<(), Str
 
 /// A tolerance on the relative residual.
 pub fn tolerance(tol: f64) -> Result<f64, String> {
-    // The residual of doing nothing is about 1: beyond, everything would pass.
-    if tol > 0.0 && tol <= 1.0 {
-        Ok(tol)
-    } else {
-        Err(format!("--tol: expected a positive number of at most 1, found {tol:?}"))
+    match is_tolerance(tol) {
+        true => Ok(tol),
+        false => Err(format!("--tol: expected {TOLERANCE}, found {tol:?}")),
     }
+}
+
+/// What a tolerance is.
+pub const TOLERANCE: &str = "a positive number of at most 1";
+
+/// Whether it is one. The residual of doing nothing is about 1: beyond, everything would pass.
+pub fn is_tolerance(tol: f64) -> bool {
+    tol > 0.0 && tol <= 1.0
 }
 
 /// Where the results of `files` go: `to` itself for one file, else a file of the same name in the directory

@@ -176,7 +176,13 @@ impl Real for f64 {
     fn hypot(self, other: Self) -> Self {
         let square = self * self + other * other;
         // Where no square leaves the range, several times faster.
-        if (1e-280..1e280).contains(&square) { square.sqrt() } else { f64::hypot(self, other) }
+        if (1e-280..1e280).contains(&square) {
+            square.sqrt()
+        } else if other == 0.0 {
+            self.abs()
+        } else {
+            f64::hypot(self, other)
+        }
     }
     #[inline]
     fn value(self) -> f64 {
@@ -236,6 +242,7 @@ impl Real for Doubled {
 }
 
 /// The power of two next below a positive `x`, within 2^±1000: a unit that changes no digit.
+#[inline]
 pub fn power_of_two(x: f64) -> f64 {
     let exponent = ((x.to_bits() >> 52) as i64).clamp(23, 2023) as u64;
     f64::from_bits(exponent << 52)

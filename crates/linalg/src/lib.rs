@@ -68,11 +68,13 @@ pub fn dot(x: &[f64], y: &[f64]) -> f64 {
 }
 
 /// The Euclidean norm, scaled so that neither overflow nor underflow of the squares spoils it.
+#[inline]
 pub fn norm(x: &[f64]) -> f64 {
     norm_of(x.iter().copied())
 }
 
 /// `‖x‖`, or 1 where x = 0: what errors are relative to.
+#[inline]
 pub fn norm_or_one(x: &[f64]) -> f64 {
     match norm(x) {
         size if size > 0.0 => size,
@@ -82,6 +84,7 @@ pub fn norm_or_one(x: &[f64]) -> f64 {
 
 /// [`norm`] of values that are computed as they come; they are run through more than once only where the plain sum
 /// of squares leaves the range of f64, or where every value is zero or not finite.
+#[inline]
 pub fn norm_of(x: impl Iterator<Item = f64> + Clone) -> f64 {
     let plain = x.clone().map(|v| v * v).sum::<f64>();
     if plain.is_finite() && plain > f64::MIN_POSITIVE / f64::EPSILON {

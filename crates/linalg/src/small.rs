@@ -98,7 +98,7 @@ pub fn inverse<const D: usize>(a: &[[f64; D]; D]) -> Option<[[f64; D]; D]> {
     }
     let largest = a.iter().flatten().fold(0.0_f64, |s, v| s.max(v.abs()));
     for k in 0..D {
-        let p = (k..D).max_by(|&i, &j| m[i][k].abs().total_cmp(&m[j][k].abs()))?;
+        let p = (k + 1..D).fold(k, |p, i| if m[i][k].abs() >= m[p][k].abs() { i } else { p });
         if m[p][k].abs() <= 1e-14 * largest || !m[p][k].is_finite() {
             return None;
         }

@@ -70,7 +70,7 @@ pub trait Problem {
     }
 
     /// Puts `point`, the one last measured with `gauge`, exactly where it is but for rounding: variables on the bounds that they are nearer to, in the judge's
-    /// units, than their partners are to zero; `boldly`, also what is below rounding in units of the whole problem. Says whether that changed it; by default nothing
+    /// units, than their partners are to zero, and impulses to zero that are rounding of the loads; `boldly`, also what is below rounding in units of the whole problem. Says whether that changed it; by default nothing
     /// does. The result is a candidate, to be measured in its turn. Allocates nothing.
     fn tidy(&self, _point: &mut Self::Point, _gauge: &mut Self::Gauge, _boldly: bool) -> bool {
         false

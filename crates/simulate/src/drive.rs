@@ -100,7 +100,7 @@ pub(crate) fn run<S: Driven>(
     observer: &mut dyn Observer<S>,
 ) -> Result<RunReport, SimulateError> {
     require(|| "h".into(), h, h > 0.0, "a positive number")?;
-    require(|| "until".into(), until, true, "a finite time")?;
+    require(|| "until".into(), until, until >= 0.0, "a time of at least 0 s")?;
     let counted = h > f64::EPSILON * until.abs();
     require(|| "h".into(), h, counted, "a step that moves the time, above 2.3e-16 of it")?;
     let mut run = RunReport { t: simulation.time(), ..RunReport::default() };

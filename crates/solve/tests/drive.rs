@@ -166,6 +166,35 @@ fn the_best_point_is_returned_whatever_comes_after() {
     }
 }
 
+/// What a solver makes of its start, in a problem of another form or by its first step, may be worse.
+#[test]
+fn nothing_worse_than_the_start_is_returned() {
+    let (problem, known) = planted();
+    let mut gauge = problem.gauge().unwrap();
+    let names = ["auto", "nsgs", "facet_inner/lemke", "admm", "newton_ac", "ip"];
+    for name in names {
+        let mut session = registry::session::<P>(name, &SettingsMap::new()).unwrap();
+        // Twice: the second solve is one of a session that is warm.
+        for off in [1e-3, 1e-4] {
+            let mut start = known.clone();
+            start.r.iter_mut().for_each(|r| *r *= 1.0 + off);
+            let first = problem.certify(&start, &mut gauge).merit();
+            for (max_iterations, time_limit) in [(0, None), (1, None), (100, Some(0.0))] {
+                let limits = Limits { max_iterations, time_limit, ..Limits::default() };
+                let mut point = start.clone();
+                let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+                let found = problem.certify(&point, &mut gauge).merit();
+                let case = format!("{name}, {max_iterations} iterations, {outcome:?}");
+                assert!(found <= first * (1.0 + 1e-9), "{case}: {found:e} after {first:e}");
+                assert!(
+                    (outcome.measure.merit() - found).abs() <= 1e-3 * found,
+                    "{case}: {found:e}"
+                );
+            }
+        }
+    }
+}
+
 #[test]
 fn limits_stop_and_are_named() {
     let (problem, _) = planted();

@@ -1,6 +1,6 @@
 //! Worker processes side by side, and the campaign from its plan to its last line.
 
-use std::collections::{BTreeMap, HashMap, VecDeque};
+use std::collections::{BTreeMap, HashMap, HashSet, VecDeque};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -216,9 +216,15 @@ fn describe(
 ) -> Result<(BTreeMap<String, Problem>, bool), String> {
     let jobs = inputs.iter().map(|&input| (input, setup.job(input, Task::Describe))).collect();
     let mut described = BTreeMap::new();
+    let mut taken = HashSet::new();
     let cancelled = each(setup, lanes, jobs, cancel, &mut |input: &Input, end, _| {
         let mut problem = problem(input, end);
-        match there.problems.get(&input.name) {
+        if let Some(before) = shorter(&problem, inputs, there)
+            && taken.insert(before)
+        {
+            problem.name = before.into();
+        }
+        match there.problems.get(&problem.name) {
             Some(old) if old.error.is_none() && old.digest != problem.digest => {
                 let file = input.path.display();
                 let why = problem.error.unwrap_or_else(|| {
@@ -235,6 +241,19 @@ fn describe(
         Ok(())
     })?;
     Ok((described, cancelled))
+}
+
+/// The name under which a problem is there, where another file of that name has come since, and its own now takes in one more folder.
+fn shorter<'a>(problem: &Problem, inputs: &[&Input], there: &'a Runs) -> Option<&'a str> {
+    if there.problems.contains_key(&problem.name) {
+        return None;
+    }
+    let mut shorter = problem.name.match_indices('/').map(|(at, _)| &problem.name[at + 1..]);
+    let (name, _) = shorter.find_map(|name| {
+        let known = there.problems.get_key_value(name);
+        known.filter(|(_, old)| old.error.is_none() && old.digest == problem.digest)
+    })?;
+    (!inputs.iter().any(|input| input.name == *name)).then_some(name)
 }
 
 impl Setup {

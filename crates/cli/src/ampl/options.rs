@@ -4,6 +4,8 @@ use nonsmooth_io::nl;
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{registry, spelling};
 
+use crate::files;
+
 /// What the words set.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Options {
@@ -102,7 +104,10 @@ impl Options {
             };
             match key.as_str() {
                 "solver" | "subsolver" => self.solver.clone_from(value),
-                "tol" | "convergence_tolerance" => self.tolerance = real()?,
+                "tol" | "convergence_tolerance" => {
+                    let found = number().filter(|x| files::is_tolerance(*x));
+                    self.tolerance = found.ok_or_else(|| wrong(files::TOLERANCE))?;
+                }
                 "max_iter" | "major_iteration_limit" => self.iterations = Some(whole()?),
                 "time_limit" => self.seconds = Some(real()?),
                 "infinity" => self.model.infinity = real()?,

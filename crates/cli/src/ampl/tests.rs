@@ -41,7 +41,7 @@ fn the_last_of_a_key_counts_and_what_path_knows_is_passed_by() {
     assert_eq!(options.tolerance, 1e-9);
     assert_eq!(options.ignored, ["crash_method", "output"]);
     assert_eq!(options.settings.len(), 1);
-    for text in ["tol=small", "max_iter=1.5", "time_limit=-1", "wantsol=1000"] {
+    for text in ["tol=small", "tol=0", "tol=2", "max_iter=1.5", "time_limit=-1", "wantsol=1000"] {
         let mistake = options.set(&pairs_of(text).unwrap()).unwrap_err();
         assert!(mistake.contains(text.split('=').next().unwrap()), "{mistake}");
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use nonsmooth_bench::campaign::inputs;
 use nonsmooth_bench::traits_table::{Described, describe, published, table};
 
+use crate::report::count;
 use crate::{Exit, files, output};
 
 /// Tabulate families of problems by their traits, beside the families published for FCLIB.
@@ -64,18 +65,29 @@ pub fn describe_all(
     };
     mistakes.iter().for_each(|m| mistake(m));
     let mut described = vec![];
-    // Linear complementarity problems have other traits: `nonsmooth info` says which.
-    let linear = |path: &Path| {
-        path.extension().is_some_and(|e| ["toml", "mtx", "dat"].iter().any(|l| e == *l))
+    // Complementarity problems have other traits: `nonsmooth info` says which.
+    let mut others = 0;
+    let without = |path: &Path| {
+        path.extension().is_some_and(|e| ["toml", "mtx", "nl"].iter().any(|l| e == *l))
     };
-    for input in inputs.iter().filter(|i| !linear(&i.path)) {
+    for input in &inputs {
+        if without(&input.path) {
+            others += 1;
+            continue;
+        }
         match describe(&input.path, spectrum_limit) {
             Ok(problem) => described.push(problem),
+            Err(e) if e.is_of_another_kind() => others += 1,
             Err(e) => mistake(&e.to_string()),
         }
     }
     if described.is_empty() {
-        return Err("expected problems that can be read, found none".into());
+        return Err(match others {
+            0 => "expected contact problems that can be read, found none".into(),
+            n => {
+                format!("expected contact problems, found {} without contacts", count(n, "problem"))
+            }
+        });
     }
     Ok((described, exit))
 }

@@ -86,6 +86,7 @@ fn a_run_goes_on_where_it_ended_as_if_it_had_not() {
         assert!(folder.path(name).exists(), "{name}");
     }
 
+    folder.run("play .").refused(&[".: /: expected a trajectory", "found a directory"]);
     folder.run("play part.h5 --svg last.svg").exits(0);
     folder.run("play part.h5 --svg frames").exits(0);
     let drawn = std::fs::read_to_string(folder.path("last.svg")).unwrap();

@@ -279,6 +279,11 @@ impl Trajectory {
     /// Errors: a file that is none, or damaged, or whose parts do not fit each other, by the part; a scene that its SHA-256 does not belong to.
     pub fn read(path: impl AsRef<Path>) -> Result<Self, IoError> {
         let path = path.as_ref();
+        if path.is_dir() {
+            let (expected, found) =
+                ("a trajectory, which is one file".into(), "a directory".into());
+            return Err(IoError::Data { file: path.into(), place: "/".into(), expected, found });
+        }
         let mut gap = None;
         loop {
             let mut run = Self::parse(path, &crate::format::bytes(path)?)?;

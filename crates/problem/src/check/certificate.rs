@@ -52,6 +52,19 @@ impl From<Impulses> for Certificate {
 }
 
 impl Certificate {
+    /// The same with those of its vectors alone that stand at these places.
+    pub(super) fn of(&self, places: &[usize]) -> Self {
+        fn taken<T: Clone>(all: &[T], places: &[usize]) -> Vec<T> {
+            places.iter().map(|&k| all[k].clone()).collect()
+        }
+        match self {
+            Self::Cones { separating } => Self::Cones { separating: taken(separating, places) },
+            Self::Separating { vectors } => Self::Separating { vectors: taken(vectors, places) },
+            // There is one.
+            other => other.clone(),
+        }
+    }
+
     /// The impulses, if that is what it is.
     pub fn impulses(&self) -> Option<&Impulses> {
         match self {

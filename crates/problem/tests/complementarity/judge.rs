@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use dashu_int::IBig;
 use nonsmooth_linalg::{Csc, Dense, Matrix, Operator};
-use nonsmooth_problem::check::{Certificate, Judged, Measure, RowStatus};
+use nonsmooth_problem::check::{Certificate, Evidence, Judged, Measure, RowStatus};
 use nonsmooth_problem::planted::{PlantedBlocks, PlantedClass, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{BoxLcp, Hlcp, HlcpPoint, Lcp, LcpPoint, Mlcp, Problem};
 use proptest::prelude::*;
@@ -538,6 +538,15 @@ fn certificates_by_hand() {
 }
 
 #[test]
+fn residuals_at_the_end_of_the_doubles_are_numbers() {
+    // Neither the norm of q nor a row's size times z is a double.
+    let problem = lcp([[1e300, -1e300], [1e300, 1e300]], [-1e308, -1.7e308]);
+    let at = measure(&problem, &point(&[1.35e8, 0.36e8]));
+    assert!(at.absolute > 1e305 && at.absolute.is_finite(), "{at:?}");
+    assert!(at.literature > 1e-3 && at.literature < 1.0, "{at:?}");
+}
+
+#[test]
 fn feasible_problems_without_a_solution_are_refuted_by_cones() {
     // Pang's perturbed problem: feasible, no solution.
     let m = [[0.0, -1.0, -1.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]];
@@ -572,6 +581,12 @@ fn feasible_problems_without_a_solution_are_refuted_by_cones() {
     let second = Certificate::Cones { separating: separating[1..].to_vec() };
     assert!(problem.verify(&both), "−z₀ − z₁ ≤ 0 for every z of these cones");
     assert!(!problem.verify(&first) && !problem.verify(&second));
+    // A vector that the proof does without is no part of it.
+    let three = [&separating[..1], &[vec![0.0, 1.0]], &separating[1..]].concat();
+    match problem.evidence(&Certificate::Cones { separating: three }) {
+        Evidence::Proved(proof) => assert_eq!(proof.certificate(), &both),
+        other => panic!("{other:?}"),
+    }
     // No solution in fact: brute force over the four cones.
     for z in [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 3.0], [2.0, 1.0]] {
         assert!(!problem.judge(&point(&z), 1e-3).unwrap().solved);

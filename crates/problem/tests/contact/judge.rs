@@ -511,6 +511,34 @@ fn what_the_square_of_the_loads_rounding_drowns_is_not_heard() {
     assert!(own(1e-40) < 1e-8 && own(1e-133) < 1e-8);
 }
 
+/// An interior point leaves such impulses where others of any size are.
+#[test]
+fn impulses_that_are_rounding_of_the_loads_are_put_to_zero() {
+    // The tangents are coupled, and the second contact bears nothing.
+    let mut w = [[0.0; 6]; 6];
+    (0..6).for_each(|i| w[i][i] = 1.0);
+    (w[1][4], w[4][1]) = (0.5, 0.5);
+    let entries = (0..36).map(|k| (k / 6, k % 6, w[k / 6][k % 6]));
+    let w = Bsr::from_csc(&Csc::from_triplets(6, 6, entries.filter(|e| e.2 != 0.0)).unwrap());
+    let q = vec![-1.0, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let problem = FrictionLocal::<3>::new(w, q, vec![0.5; 2]).unwrap();
+    for (left, boldly, is_rounding) in [
+        (1e-17, false, true),
+        (1e-15, false, true),
+        (1e-13, false, false),
+        (1e-13, true, true),
+        (1e-11, true, false),
+    ] {
+        let r = vec![1.0, 0.0, 0.0, left, 0.0, 0.0];
+        let mut point = LocalPoint { r, ..problem.origin() };
+        assert!(!problem.judge(&point, 1e-8).unwrap().solved, "{left}");
+        let mut gauge = problem.gauge().unwrap();
+        problem.measure(&point, &mut gauge);
+        assert_eq!(problem.tidy(&mut point, &mut gauge, boldly), is_rounding, "{left}");
+        assert_eq!(problem.judge(&point, 1e-8).unwrap().solved, is_rounding, "{left}");
+    }
+}
+
 #[test]
 fn own_does_not_depend_on_the_scale_of_a_contact() {
     let (problem, point) = Planted { contacts: 8, dofs: 30, ..Planted::default() }.local::<3>();

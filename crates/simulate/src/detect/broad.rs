@@ -20,6 +20,12 @@ impl Aabb {
         (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
     }
 
+    /// How far x is from it; zero within.
+    pub fn distance(&self, x: Vec3) -> f64 {
+        let beyond = |k: usize| (self.low[k] - x[k]).max(x[k] - self.high[k]).max(0.0);
+        (0..3).map(|k| beyond(k) * beyond(k)).sum::<f64>().sqrt()
+    }
+
     fn extent(&self) -> f64 {
         (0..3).map(|k| self.high[k] - self.low[k]).fold(0.0, f64::max)
     }

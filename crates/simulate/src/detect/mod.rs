@@ -10,7 +10,7 @@
 //! | cylinder, cone with sphere | closed form in the half plane through the axis |
 //! | capsule with box, polyhedron; cylinder, cone with all that is convex | [`convex`]: distance, then features |
 //! | elastic box with elastic box | [`facing`]: nodes of the finer mesh at faces of the other |
-//! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges |
+//! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges; [`inside`]: what lies behind all of them |
 //! | mesh with mesh, heightfield | [`surfaces`]: pairs of triangles in two trees, filtered at the edges of both |
 //! | an image of either in a world that repeats itself | [`images`] finds the pair, then as above |
 //! | polygon with polygon, disc, capsule | [`outline`]: separating sides with hysteresis, sides clipped by sides; nearest side or corner |
@@ -25,6 +25,7 @@ mod facing;
 mod gjk;
 mod hull;
 mod images;
+mod inside;
 mod outline;
 mod rounds;
 mod segments;
@@ -156,7 +157,17 @@ impl Solids {
                         .iter()
                         .fold([start; 3], |s, v| std::array::from_fn(|i| f(s[i], v[i])))
                 };
-                (by(f64::INFINITY, f64::min), by(f64::NEG_INFINITY, f64::max), margin)
+                let (mut low, mut high) =
+                    (by(f64::INFINITY, f64::min), by(f64::NEG_INFINITY, f64::max));
+                if let Solid::Surface(surface) = solid
+                    && let Some(below) = surface.below
+                {
+                    // What has sunk below a field is met there, as far down as the field is large.
+                    let depth = scale(surface.size, pose.direction(below));
+                    low = std::array::from_fn(|i| low[i] + depth[i].min(0.0));
+                    high = std::array::from_fn(|i| high[i] + depth[i].max(0.0));
+                }
+                (low, high, margin)
             }
             Solid::Turned(turned) => {
                 let placed = turned.placed(pose);
@@ -298,6 +309,14 @@ impl Detector {
                 let (first, second) = (name(i), name(j));
                 return Err(SimulateError::Pair { a: place(i), b: place(j), first, second });
             }
+        }
+        // Nor is it known from which side a point has come that has passed one by rounding.
+        let sheet = surfaces.iter().find(|&&k| is_sheet(k));
+        if let (Some(&k), false) = (sheet, world.elastic.is_empty()) {
+            let (a, b) =
+                (format!("{}.parts[{}]", world.label(names[k].0), names[k].1), "elastic[0]".into());
+            let (first, second) = ("mesh that is not closed", "box that is elastic");
+            return Err(SimulateError::Pair { a, b, first, second });
         }
         let free = world.bodies.iter().map(super::world::Body::is_free);
         let moves: Vec<bool> = free.chain(nodes.list.iter().map(|_| true)).collect();

@@ -52,7 +52,7 @@ pub(crate) struct Surface {
     /// The two triangles of each edge, the second one may be none, and whether they are coplanar.
     pub(super) edges: Vec<([u32; 2], bool)>,
     /// For each triangle the first of those that make a plane face with it, after which that is named: what moves over the edges between them stays the same contact.
-    faces: Vec<u32>,
+    pub(super) faces: Vec<u32>,
     /// For each vertex the vertices that it has an edge with, and whether all its triangles are coplanar.
     around: Vec<(Vec<u32>, bool)>,
     pub(super) tree: Vec<Node>,
@@ -60,6 +60,8 @@ pub(crate) struct Surface {
     pub size: f64,
     /// The least side of the box about it, m; of a heightfield no bound.
     pub(super) thickness: f64,
+    /// Where the solid below a heightfield lies.
+    pub(super) below: Option<Vec3>,
 }
 
 /// A box and what is in it: two nodes from `first` on, or `count` triangles.
@@ -75,7 +77,7 @@ pub(super) struct Node {
 pub(crate) struct Scratch {
     pub(super) thin: Thin,
     pub(super) other: Thin,
-    near: Vec<u32>,
+    pub(super) near: Vec<u32>,
     pub(super) pairs: Vec<(u32, u32)>,
     pub(super) stack: Vec<(u32, u32)>,
     pub(super) found: Vec<([Feature; 2], Witness)>,
@@ -198,6 +200,8 @@ impl Surface {
             order: vec![],
             size,
             thickness,
+            below: (mesh.is_one_sided() && thickness.is_infinite())
+                .then(|| pose.direction([0.0, 0.0, -1.0])),
         };
         out.grow();
         out
@@ -263,7 +267,7 @@ impl Surface {
     }
 
     /// The triangles whose boxes meet a box of the world, in order.
-    fn near(&self, pose: &Pose, bounds: &Aabb, out: &mut Vec<u32>) {
+    pub(super) fn near(&self, pose: &Pose, bounds: &Aabb, out: &mut Vec<u32>) {
         let middle = std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d]));
         let half: Vec3 = std::array::from_fn(|d| 0.5 * (bounds.high[d] - bounds.low[d]));
         let middle = pose.local_point(middle);
@@ -341,6 +345,25 @@ impl Surface {
 
     /// All points where the surface is nearer to another solid than `prediction`; `bounds` is the box of that, in the world. The surface is the first of the two.
     pub fn collide(
+        &self,
+        (pose, other, bounds): (&Pose, &Side, &Aabb),
+        prediction: f64,
+        (clip, scratch): (&mut Clip, &mut Scratch),
+        mut found: impl FnMut([Feature; 2], Witness),
+    ) {
+        let mut met = false;
+        let note = |features: [Feature; 2], witness: Witness| {
+            met = true;
+            found(features, witness);
+        };
+        self.meet((pose, other, bounds), prediction, (clip, scratch), note);
+        if !met && self.one_sided {
+            self.catch((pose, other, bounds), prediction, (clip, scratch), &mut found);
+        }
+    }
+
+    /// The points where triangles near the other solid have normals of the surface.
+    fn meet(
         &self,
         (pose, other, bounds): (&Pose, &Side, &Aabb),
         prediction: f64,

@@ -6,7 +6,7 @@ use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 
 use super::gradients::Gradients;
-use super::state::{LagrangianContact, LagrangianState};
+use super::state::{LagrangianContact, LagrangianState, Memory};
 use super::step::{Tools, zero};
 use super::{Lagrangian, LagrangianScheme};
 use crate::SimulateError;
@@ -260,15 +260,24 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
 
     /// Goes on from a checkpoint of the same system.
     ///
-    /// Errors: bytes that are none.
+    /// Errors: bytes that are none; the checkpoint of a system with other numbers of coordinates, contacts, relations or rows.
     pub fn restore(&mut self, checkpoint: &[u8]) -> Result<(), SimulateError> {
         let wrong = |found: String| SimulateError::value("checkpoint", "one of this system", found);
         let state: LagrangianState =
             serde_json::from_slice(checkpoint).map_err(|e| wrong(e.to_string()))?;
-        let n = self.system.size().dofs;
+        let size = self.system.size();
+        let n = size.dofs;
         if [state.q.len(), state.v.len()] != [n; 2] {
             let found = [state.q.len(), state.v.len()];
             return Err(wrong(format!("one of {found:?} coordinates and velocities")));
+        }
+        // Before the first step nothing is remembered.
+        let found = state.memory.lengths();
+        let expected = Memory::lengths_of(size, D);
+        if found != expected && (state.steps > 0 || found != [0; 4]) {
+            return Err(wrong(format!(
+                "one of {found:?} contact impulses, other impulses, active and stuck, not {expected:?}"
+            )));
         }
         self.state = state;
         Ok(())

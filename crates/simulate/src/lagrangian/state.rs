@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::Size;
+
 /// Time, coordinates, velocities, and what is remembered of the last step. All that the next step depends on.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct LagrangianState {
@@ -30,6 +32,19 @@ pub(super) struct Memory {
     pub active: Vec<bool>,
     /// nc: whether it had an impulse inside its cone.
     pub stuck: Vec<bool>,
+}
+
+impl Memory {
+    /// Of impulses of contacts and others, and of flags.
+    pub fn lengths(&self) -> [usize; 4] {
+        [self.contacts.len(), self.scalars.len(), self.active.len(), self.stuck.len()]
+    }
+
+    /// What these are after a step of a system of this size, in dimension d.
+    pub fn lengths_of(size: Size, d: usize) -> [usize; 4] {
+        let Size { contacts, relations, rows, .. } = size;
+        [d * contacts, relations + rows, contacts + rows, contacts]
+    }
 }
 
 /// What a contact did in the last step.

@@ -227,6 +227,42 @@ fn equalities_are_joints_and_couplings() {
 }
 
 #[test]
+fn names_that_are_looked_up_are_of_one_element() {
+    let model = |inner: &str| {
+        let text = format!("<mujoco><worldbody>\n{inner}\n</worldbody></mujoco>");
+        mjcf(&text, Path::new("")).map(|_| ()).map_err(|e| e.to_string())
+    };
+    let body = |name: &str, joint: &str, geom: &str| {
+        format!(
+            "<body name='{name}'><freejoint name='{joint}'/>\n<geom name='{geom}' size='1' contype='0' conaffinity='0'/></body>"
+        )
+    };
+    let two = |second: [&str; 3]| {
+        model(&format!("{}\n{}", body("a", "j", "g"), body(second[0], second[1], second[2])))
+    };
+    assert_eq!(two(["b", "k", "h"]), Ok(()));
+    // Elements of different tags may share a name, and what has none is not looked up.
+    assert_eq!(two(["g", "a", "j"]), Ok(()));
+    assert_eq!(two(["", "", ""]), Ok(()));
+    for (second, says) in [
+        (
+            ["a", "k", "h"],
+            "<body> `a` (line 4): expected a name of its own, found that of <body> `a` (line 2)",
+        ),
+        (
+            ["b", "j", "h"],
+            "<freejoint> `j` (line 4): expected a name of its own, found that of <freejoint> `j` (line 2)",
+        ),
+        (
+            ["b", "k", "g"],
+            "<geom> `g` (line 5): expected a name of its own, found that of <geom> `g` (line 3)",
+        ),
+    ] {
+        assert_eq!(two(second), Err(says.to_owned()));
+    }
+}
+
+#[test]
 fn meshes_and_height_fields_are_shapes_and_included_files_are_read() {
     let folder = std::env::temp_dir().join(format!("nonsmooth-mjcf-{}", std::process::id()));
     std::fs::create_dir_all(folder.join("parts")).unwrap();

@@ -481,6 +481,8 @@ struct Kept<P: Problem, S: Solver<P>> {
     untouched: bool,
     best: P::Point,
     tidied: P::Point,
+    /// The caller's start: what solvers make of it may be worse.
+    given: P::Point,
     /// A limit was reached inside a kernel, which left something unfinished.
     torn: bool,
 }
@@ -570,9 +572,9 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
                 solver.refill(problem, &mut k.work).map(|()| k)
             }
             None => made.unwrap_or_else(|| solver.work(problem)).map(|work| {
-                let (best, tidied) = (point.clone(), point.clone());
+                let (best, tidied, given) = (point.clone(), point.clone(), point.clone());
                 let (origin, untouched, torn) = (problem.origin(), false, false);
-                Box::new(Kept { work, origin, untouched, best, tidied, torn })
+                Box::new(Kept { work, origin, untouched, best, tidied, given, torn })
             }),
         };
         let mut now = match ready {
@@ -590,8 +592,9 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
             }
         };
         let outcome = {
-            let Kept { work, best, tidied, .. } = &mut *now;
+            let Kept { work, best, tidied, given, .. } = &mut *now;
             P::copy_point(point, best);
+            P::copy_point(point, given);
             let mut run = Run {
                 problem,
                 solver,
@@ -601,7 +604,7 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
                 scope: &scope,
                 observer,
             };
-            run.solve(point)
+            run.solve(point, given)
         };
         now.torn = scope.raised();
         *kept = Some(now);
@@ -662,13 +665,21 @@ struct Run<'a, P: Problem, S: Solver<P>> {
 /// could not make it pass.
 const DOUBTFUL: f64 = 1e3;
 
+/// Whether that is so, or a judgement takes whatever time a caller's functions take.
+pub(crate) fn is_hopeless<P: Problem>(problem: &P, best: &Measure, limits: &Limits) -> bool {
+    problem.asks_functions()
+        || problem.burden() > guard::SMALL && best.merit() > DOUBTFUL * limits.tolerance
+}
+
 impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
-    fn solve(&mut self, point: &mut P::Point) -> Outcome {
+    fn solve(&mut self, point: &mut P::Point, given: &mut P::Point) -> Outcome {
         let mut iterations = 0;
         self.solver.aim(self.limits.tolerance, self.work);
         self.solver.record(self.limits.trace, self.work);
         self.solver.start(self.problem, point, self.work);
         self.judge(point, 0, Look::Plainly);
+        // Else a method's form of the start, or its first step, was judged in its place.
+        let counted = !self.solver.latest() && *given == *point;
         let mut estimate = f64::NAN;
         let mut since_judged = 0;
         let mut claim = None;
@@ -737,9 +748,7 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
         };
         P::copy_point(self.judge.best, point);
         let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
-        let hopeless = self.problem.asks_functions()
-            || self.problem.burden() > guard::SMALL
-                && self.judge.best_measure.merit() > DOUBTFUL * self.limits.tolerance;
+        let hopeless = is_hopeless(self.problem, &self.judge.best_measure, self.limits);
         let measure = match self.judge.certified {
             Some(measure) => measure,
             // The best point is the start still.
@@ -758,6 +767,19 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 // A projection that the limit cut short says nothing of a point that was judged before.
                 let cut_short = budget::over() && measure.merit() >= f64::MAX;
                 if cut_short { self.judge.best_measure } else { measure }
+            }
+        };
+        // What a solver of another problem ends with is its answer; where a limit stops it, it has none.
+        let answered = match status {
+            Status::Solved => true,
+            Status::Limit(_) => false,
+            _ => self.solver.latest(),
+        };
+        let measure = match counted || answered {
+            true => measure,
+            false => {
+                let closely = !(late && hopeless);
+                or_start(self.problem, given, point, self.judge.gauge, measure, closely)
             }
         };
         // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
@@ -920,6 +942,34 @@ pub(crate) fn fallen_back<P: Problem>(
     }
     *point = origin;
     measure
+}
+
+/// The start is one of the points that an unsolved problem's solve may return: where its residuals, certified if `closely`, are smaller than those of `point`, it takes its place. Cost: one
+/// judgement, of a global problem one more. Allocates nothing.
+pub(crate) fn or_start<P: Problem>(
+    problem: &P,
+    start: &mut P::Point,
+    point: &mut P::Point,
+    gauge: &mut P::Gauge,
+    measure: Measure,
+    closely: bool,
+) -> Measure {
+    if *start == *point {
+        return measure;
+    }
+    let mut first = problem.measure(start, gauge);
+    // A start is given by its impulses alone.
+    if problem.follow_impulses(start, gauge) || closely {
+        first = match closely {
+            true => problem.certify(start, gauge),
+            false => problem.measure(start, gauge),
+        };
+    }
+    if !first.is_better_than(&measure) {
+        return measure;
+    }
+    P::copy_point(start, point);
+    first
 }
 
 /// Since when a solve gets no further.

@@ -38,8 +38,8 @@ struct Told<P: Problem> {
     best: Option<(P::Point, Measure)>,
 }
 
-/// The observer on the thread of the solve.
-struct Relay<P: Problem>(Arc<Seen<P>>);
+/// The observer on the thread of the solve, and its tolerance.
+struct Relay<P: Problem>(Arc<Seen<P>>, f64);
 
 impl<P: Problem> Observer<P> for Relay<P> {
     fn step(&mut self, progress: &Progress) {
@@ -56,10 +56,12 @@ impl<P: Problem> Observer<P> for Relay<P> {
     fn best(&mut self, point: &P::Point, measure: &Measure) {
         let mut told = locked(&self.0.told);
         match &mut told.best {
-            Some((kept, of)) => {
+            // A solve that is given up has no answer that were more than the best point.
+            Some((kept, of)) if measure.passes(self.1) || measure.is_better_than(of) => {
                 P::copy_point(point, kept);
                 *of = *measure;
             }
+            Some(_) => {}
             none => *none = Some((point.clone(), *measure)),
         }
     }
@@ -119,7 +121,8 @@ impl<P: Registered> Session<P> for Guarded<P> {
         };
         let done = guard::run(&left, tick, move |limits| {
             let (problem, mut point, seen) = copy;
-            let outcome = session.observe(&problem, &mut point, limits, &mut Relay(seen));
+            let outcome =
+                session.observe(&problem, &mut point, limits, &mut Relay(seen, limits.tolerance));
             (session, point, outcome)
         });
         match done {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{History, MODEST, Meter, fallen_back, is_final};
+use crate::core::drive::{History, MODEST, Meter, fallen_back, is_final, is_hopeless, or_start};
 use crate::core::register::{self, Registered};
 use crate::core::settings::SettingsMap;
 use crate::core::trace::Trace;
@@ -365,7 +365,16 @@ impl<P: Registered> Session<P> for Portfolio<P> {
             status = Status::Infeasible(proof);
         }
         let measure = match tally.best {
-            Some((best, measure)) => {
+            Some((mut best, measure)) => {
+                let measure = match &mut self.gauge {
+                    // Where no candidate that began there has kept it: one that began elsewhere, or that has solved another problem.
+                    Some(gauge) if status != Status::Solved => {
+                        let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
+                        let closely = !(late && is_hopeless(problem, &measure, limits));
+                        or_start(problem, point, &mut best, gauge, measure, closely)
+                    }
+                    _ => measure,
+                };
                 P::copy_point(&best, point);
                 measure
             }

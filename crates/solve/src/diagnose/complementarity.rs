@@ -23,7 +23,9 @@ pub(super) fn findings(
     if let Some(classes) = &classes {
         findings.push(class(classes, matches!(problem, Complementarity::Lcp(_))));
     }
-    findings.extend(matrices.iter().filter_map(|(name, m)| deficiency(name, m, rows)));
+    for (name, m) in &matrices {
+        findings.extend(deficiency(name, m, rows, classes.as_ref()));
+    }
     findings.extend(scale(&matrices));
     let existence = existence::classified(problem, classes, &most());
     findings.push(of_existence(&existence));
@@ -113,18 +115,25 @@ fn class(classes: &Classes, is_lcp: bool) -> Finding {
     }
 }
 
-fn deficiency(name: &str, m: &Matrix, rows: usize) -> Option<Finding> {
+/// What a rank below the full one means, beside what is proved of M as it is stored: rounding decides the rank, not the class.
+fn singular(classes: Option<&Classes>) -> &'static str {
+    let proved = |class| classes.is_some_and(|classes| classes.is(class));
+    if proved(Class::P) {
+        "As a P-matrix M is nonsingular, by less than rounding: a block that a method inverts may be singular to it."
+    } else if proved(Class::StrictlyCopositive) {
+        "Singular: solutions may be many; a block that a method inverts may be singular."
+    } else {
+        "Singular: solutions may be many or none; a block that a method inverts may be singular."
+    }
+}
+
+fn deficiency(name: &str, m: &Matrix, rows: usize, classes: Option<&Classes>) -> Option<Finding> {
     let a = m.to_csc()?;
     let rank = rank(&a, rows.saturating_mul(rows))?;
     let least = m.nrows().min(m.ncols());
     let says = format!("{name} has rank {rank} of {least}, up to rounding");
     Some(match rank < least {
-        true => hard(
-            "rank",
-            says,
-            "Singular: solutions may be many or none; a block that a method inverts may be singular.",
-            vec![],
-        ),
+        true => hard("rank", says, singular(classes), vec![]),
         false => easy("rank", says, ""),
     })
 }

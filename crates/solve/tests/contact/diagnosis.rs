@@ -2,7 +2,7 @@
 
 use nonsmooth_linalg::{Csc, Dense};
 use nonsmooth_problem::planted::{Planted, PlantedClass, PlantedLcp};
-use nonsmooth_problem::{AnyProblem, Friction, Lcp};
+use nonsmooth_problem::{AnyProblem, Complementarity, Friction, Lcp};
 use nonsmooth_solve::Limits;
 use nonsmooth_solve::diagnose::{Diagnosis, Effort, Finding, diagnose};
 
@@ -27,6 +27,23 @@ fn a_regular_problem_is_sound_and_a_hyperstatic_one_hard() {
     let finding = says(&d, "rank").unwrap();
     assert!(finding.hard && finding.says.contains("rank 30 of 60"), "{finding:?}");
     assert!(finding.says.contains("c = 2.00"), "{finding:?}");
+}
+
+#[test]
+fn a_class_that_is_proved_stands_above_a_rank_that_is_rounded() {
+    let matrix = |a: f64| Dense::from_rows(&[[1.0, 1.0], [1.0, a]]).unwrap();
+    let means = |a: f64| {
+        let d = of(Complementarity::Lcp(Lcp::new(matrix(a), vec![-1.0; 2]).unwrap()));
+        let rank = says(&d, "rank").unwrap();
+        assert!(rank.hard && rank.says.contains("rank 1 of 2"), "{rank:?}");
+        (says(&d, "class").unwrap().means.clone(), rank.means.clone())
+    };
+    let (class, rank) = means(1.0 + f64::EPSILON);
+    assert_eq!(class, "Every q has exactly one solution.");
+    assert!(rank.contains("nonsingular") && !rank.contains("many"), "{rank}");
+    // Entries above zero: strictly copositive, and singular.
+    let (class, rank) = means(1.0);
+    assert!(class.starts_with("Every q has a solution") && !rank.contains("none"), "{rank}");
 }
 
 #[test]

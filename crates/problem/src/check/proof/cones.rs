@@ -172,27 +172,29 @@ impl ConeSystem {
             && self.pairs.iter().flatten().all(|&j| excluded[j] || sign(j).is_ge())
     }
 
-    /// As [`refuted_by`](Self::refuted_by), with the entries in doubles: by how much, see [`Proof::margin`](super::Proof::margin), where the rows of the problem have these weights.
+    /// As [`refuted_by`](Self::refuted_by), with the entries in doubles: the places of the vectors that separate something, for the others are superfluous, and by how much there is no solution, see
+    /// [`Proof::margin`](super::Proof::margin), where the rows of the problem have these weights.
     pub(crate) fn refutation(
         &self,
         entries: &Entries,
         vectors: &[Vec<Exact>],
         weights: &[f64],
-    ) -> Option<f64> {
+    ) -> Option<(Vec<usize>, f64)> {
         if self.wanted.is_some() && !vectors.iter().all(|y| self.is_supported(y)) {
             return None;
         }
         if !vectors.iter().all(|y| y.len() == self.rhs.len()) {
             return None;
         }
-        let sides: Vec<_> =
-            vectors.iter().map(|y| self.separates(entries, y)).collect::<Option<_>>()?;
+        let each = vectors.iter().map(|y| self.separates(entries, y)).enumerate();
+        let (places, sides): (Vec<usize>, Vec<_>) =
+            each.filter_map(|(k, sides)| Some((k, sides?))).unzip();
         if !all_closed(&sides, self.pairs.len()) {
             return None;
         }
         let weights = exacts(weights);
         // What the vectors that miss by most close already is missed by as much; fewer vectors close no more.
-        let excess: Vec<f64> = vectors.iter().map(|y| self.excess(y, &weights)).collect();
+        let excess: Vec<f64> = places.iter().map(|&k| self.excess(&vectors[k], &weights)).collect();
         let mut order: Vec<usize> = (0..excess.len()).collect();
         order.sort_by(|&a, &b| excess[b].total_cmp(&excess[a]));
         let closed = |count: usize| {
@@ -204,7 +206,7 @@ impl ConeSystem {
             let middle = open.midpoint(enough);
             if closed(middle) { enough = middle } else { open = middle }
         }
-        Some(excess[order[enough - 1]])
+        Some((places, excess[order[enough - 1]]))
     }
 
     /// For a y that separates: the least error in some row that has a weight, over that weight and as a part of the largest such right-hand side, of whatever it separates b from:
@@ -520,5 +522,15 @@ mod tests {
         two[1][3] = [false, true];
         assert!(!all_closed(&two, 60));
         assert!(!all_closed(&[], 3) && !all_closed(&[], 0));
+    }
+
+    #[test]
+    fn a_vector_that_separates_nothing_does_no_harm() {
+        let system = nearly(0.0);
+        let [y, none] = [[Exact::ONE, Exact::ONE], [Exact::ZERO, Exact::ONE]].map(Vec::from);
+        let all = [none.clone(), y];
+        let (places, _) = system.refutation(&system.entries(), &all, &[]).unwrap();
+        assert_eq!(places, [1]);
+        assert!(!system.refuted_by(&[none]));
     }
 }

@@ -79,12 +79,18 @@ impl<'de> Deserialize<'de> for Number {
 }
 
 impl Proof {
-    fn new(certificate: Certificate, vectors: &[Vec<Exact>], margin: f64) -> Self {
-        let sparse = |y: &Vec<Exact>| {
-            let entries = y.iter().enumerate().filter(|(_, y)| !y.is_zero());
+    /// Of the vectors those at the given places, which are what proves.
+    fn new(
+        certificate: &Certificate,
+        vectors: &[Vec<Exact>],
+        (places, margin): (Vec<usize>, f64),
+    ) -> Self {
+        let sparse = |k: &usize| {
+            let entries = vectors[*k].iter().enumerate().filter(|(_, y)| !y.is_zero());
             Sparse(entries.map(|(i, y)| (i, Number(y.clone()))).collect())
         };
-        Self { certificate, exact: vectors.iter().map(sparse).collect(), margin }
+        let exact = places.iter().map(sparse).collect();
+        Self { certificate: certificate.of(&places), exact, margin }
     }
 
     /// What was claimed.
@@ -145,8 +151,8 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
     let vectors: Vec<Vec<Exact>> = claims.into_iter().map(|y| y.over(&system)).collect();
     let seen = system.entries();
     let weights: Vec<f64> = (0..rows).map(|i| problem.weight(i)).collect();
-    if let Some(margin) = system.refutation(&seen, &vectors, &weights) {
-        return Evidence::Proved(Proof::new(certificate.clone(), &vectors, margin));
+    if let Some(found) = system.refutation(&seen, &vectors, &weights) {
+        return Evidence::Proved(Proof::new(certificate, &vectors, found));
     }
     // First as they are, then without the entries that may be noise.
     let mut nearly: Option<f64> = None;
@@ -165,8 +171,8 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
         }
         let mended = Some(system.mended(&seen, &given)).filter(|mended| *mended != given);
         for candidate in mended.iter().chain([&given]) {
-            if let Some(margin) = system.refutation(&seen, candidate, &weights) {
-                return Evidence::Proved(Proof::new(certificate.clone(), candidate, margin));
+            if let Some(found) = system.refutation(&seen, candidate, &weights) {
+                return Evidence::Proved(Proof::new(certificate, candidate, found));
             }
             let change = system.nearness(&seen, candidate);
             nearly = change.into_iter().chain(nearly).reduce(f64::min);

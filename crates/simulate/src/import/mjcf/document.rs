@@ -36,6 +36,22 @@ impl Element {
     pub fn wrong(&self, expected: impl Into<String>, found: impl ToString) -> SimulateError {
         SimulateError::value(self.key(), expected, found)
     }
+
+    /// Notes it under its name among the elements of a space of names.
+    ///
+    /// Errors: another one of that name.
+    pub fn is_first<'a, 's>(
+        &'a self,
+        space: &'s str,
+        name: Option<String>,
+        known: &mut BTreeMap<(&'s str, String), &'a Self>,
+    ) -> Result<(), SimulateError> {
+        let Some(name) = name.filter(|name| !name.is_empty()) else { return Ok(()) };
+        match known.insert((space, name), self) {
+            Some(first) => Err(self.wrong("a name of its own", format!("that of {}", first.key()))),
+            None => Ok(()),
+        }
+    }
 }
 
 /// The elements of a model in `folder`, with those of the files that it includes in their places.
@@ -111,6 +127,25 @@ fn include(
         children.append(&mut inner.children);
     }
     element.children = children;
+    Ok(())
+}
+
+/// Bodies, geoms and joints are looked up by their names, each of its own tag.
+///
+/// Errors: two of the same name.
+pub(super) fn names_differ(root: &Element) -> Result<(), SimulateError> {
+    let mut known = BTreeMap::new();
+    let mut open: Vec<&Element> = root.named("worldbody").collect();
+    while let Some(element) = open.pop() {
+        // From the last to the first: they are met in the order of the document.
+        open.extend(element.children.iter().rev());
+        let space = match element.tag.as_str() {
+            "body" | "geom" | "joint" => &element.tag[..],
+            "freejoint" => "joint",
+            _ => continue,
+        };
+        element.is_first(space, element.attributes.get("name").cloned(), &mut known)?;
+    }
     Ok(())
 }
 

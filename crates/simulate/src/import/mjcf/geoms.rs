@@ -121,6 +121,7 @@ impl<'a> Assets<'a> {
         compiler: &'a Compiler,
     ) -> Result<Self, SimulateError> {
         let (mut meshes, mut fields) = (BTreeMap::new(), BTreeMap::new());
+        let mut known = BTreeMap::new();
         for element in root.named("asset").flat_map(|a| &a.children) {
             let item = defaults.item(element, MAIN)?;
             let stem = || {
@@ -131,9 +132,11 @@ impl<'a> Assets<'a> {
             let Some(name) = item.text("name").map(str::to_owned).or_else(stem) else { continue };
             match element.tag.as_str() {
                 "mesh" => {
+                    element.is_first("mesh", Some(name.clone()), &mut known)?;
                     meshes.insert(name, MeshAsset { item, solid: OnceCell::new() });
                 }
                 "hfield" => {
+                    element.is_first("hfield", Some(name.clone()), &mut known)?;
                     fields.insert(name, item);
                 }
                 "model" => return Err(item.wrong("one model", "another one")),

@@ -39,6 +39,7 @@ pub fn mjcf(text: &str, folder: &Path) -> Result<Imported, SimulateError> {
         "contacts are rigid, with Coulomb's law and e = 0: solref, solimp, impratio and torsional friction are not of our law and left out".to_owned(),
     ];
     known(&root, &mut said)?;
+    document::names_differ(&root)?;
     let compiler = Compiler::read(&root, &defaults, folder.into(), &mut said)?;
     let assets = Assets::read(&root, &defaults, &compiler)?;
     let mut tree = Tree::read(&root, &defaults, &compiler, &assets, said)?;

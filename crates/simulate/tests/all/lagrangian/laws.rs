@@ -354,6 +354,13 @@ fn a_checkpoint_goes_on_as_if_nothing_had_happened() {
     assert_eq!(whole.state(), second.state());
     let said = second.restore(b"{}").unwrap_err().to_string();
     assert!(said.starts_with("checkpoint: expected one of this system"), "{said}");
+    // A system with as many coordinates, and no contact.
+    let mut rod = LagrangianSimulation::new(Rod, theta(0.5), &[0.6, 0.8], &[0.0; 2]).unwrap();
+    let said = rod.restore(&first.checkpoint()).unwrap_err().to_string();
+    assert!(said.contains("one of [2, 0, 1, 1] contact impulses"), "{said}");
+    rod.restore(&new().checkpoint()).unwrap();
+    let said = rod.run(-1.0, 1e-3, &mut ()).unwrap_err().to_string();
+    assert_eq!(said, "until: expected a time of at least 0 s, found -1");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Flat ground of triangles is met as a plane is, and a ball at the rim of a cone as at any other corner.
 
-use nonsmooth_scenes::{Polyhedron, Rotation};
-use nonsmooth_simulate::{Body, Mesh, Part, Shape};
+use nonsmooth_scenes::{ElasticBox, Material, Polyhedron, Rotation};
+use nonsmooth_simulate::{Body, Elastic, Mesh, MoreauJean, Part, Shape, Simulation};
 
 use crate::verification::{run, simulation, v, weightless, world, x};
 
@@ -62,6 +62,69 @@ fn what_falls_on_triangles_is_no_deeper_than_on_a_plane() {
                 assert!(on_mesh <= 1.2 * on_plane, "{k} {j} {angle}: {on_mesh} {on_plane}");
             }
         }
+    }
+}
+
+/// Smaller than the way of a step, so that they end behind the triangles as a whole.
+#[test]
+fn what_is_smaller_than_its_way_does_not_fall_through_solid_ground() {
+    let solid = |shape: Shape| Body::solid(shape, 1000.0).unwrap();
+    let bodies = [
+        solid(Shape::Sphere { radius: 1e-3 }),
+        solid(Shape::Box { half: [2e-3; 3] }),
+        solid(Shape::Box { half: [2e-2, 2e-2, 1.5e-3] }),
+        solid(Shape::Cylinder { half_length: 2e-3, radius: 2e-3 }),
+        solid(Shape::Cone { half_length: 2e-3, radius: 2e-3 }),
+        solid(Shape::Capsule { half_length: 2e-3, radius: 1e-3 }),
+    ];
+    let (h, fast) = (1e-3, 5.0);
+    for (k, body) in bodies.into_iter().enumerate() {
+        for start in 0..6 {
+            let at = [0.013, -0.021, 0.03 + 0.0011 * f64::from(start)];
+            let turn = Rotation::about([1.0, 0.4, 0.0], 0.3);
+            let body = body.clone().turned(turn).at(at).moving([0.0, 0.0, -fast], [0.0; 3]);
+            for (j, ground) in flat().into_iter().enumerate().skip(1) {
+                let mut world = world(0.5, 0.0);
+                world.add(ground);
+                let body = world.add(body.clone());
+                let mut s = simulation(world);
+                run(&mut s, 0.3, h);
+                let [_, _, z] = x(&s, body);
+                assert!(z > -1.1 * h * fast, "{k} {start} {j}: {z}");
+            }
+        }
+    }
+}
+
+#[test]
+fn elastic_boxes_stand_on_solid_triangles_and_sheets_are_refused() {
+    let block = || {
+        let material =
+            Material { density: 1000.0, young: 1e6, poisson: 0.3, alpha: 0.0, beta: 0.0 };
+        let mut solid = ElasticBox::new([0.2; 3], [2; 3], material).unwrap();
+        solid.position = [0.013, -0.021, 0.1];
+        solid.lumped = true;
+        Elastic::new(solid)
+    };
+    for (j, ground) in flat().into_iter().enumerate() {
+        let mut world = world(0.5, 0.0);
+        world.add(ground);
+        world.add_elastic(block());
+        if j == 0 {
+            let error = Simulation::new(world, MoreauJean::default()).err().unwrap().to_string();
+            let expected = "contact between a mesh that is not closed and a box that is elastic";
+            assert!(error.contains(expected), "{error}");
+            continue;
+        }
+        let mut s = simulation(world);
+        let mut deepest = 0.0;
+        for _ in 0..300 {
+            deepest = f64::max(deepest, s.step(1e-3).unwrap().drift.penetration);
+        }
+        assert!(deepest < 1e-4, "{j}: {deepest}");
+        let moved = s.state().elastic[0].displacement.iter();
+        let fallen = moved.fold(0.0, |d, x| f64::min(d, x[2]));
+        assert!(fallen > -1e-2, "{j}: {fallen}");
     }
 }
 

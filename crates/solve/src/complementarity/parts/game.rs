@@ -54,21 +54,25 @@ fn is_plausible(system: &System) -> bool {
     right && system.matrix.diagonal().is_some_and(|d| d.iter().all(|d| *d == 0.0))
 }
 
+/// What is no game, and what is several: an equilibrium of all may leave one of them out, and is then no solution.
+const OTHER: &str = "another problem";
+const PARTS: &str = "games that have no strategy in common, each a problem of its own";
+
 impl Game {
-    /// The game, if the problem is one.
-    pub fn of(system: &System) -> Option<Self> {
+    /// The game, if the problem is one; else what it is.
+    pub fn of(system: &System) -> Result<Self, &'static str> {
         if !is_plausible(system) {
-            return None;
+            return Err(OTHER);
         }
-        let rows = by_rows(system.matrix)?;
+        let rows = by_rows(system.matrix).ok_or(OTHER)?;
         match system.free() {
             0 => Self::of_costs(&rows, system.q),
-            _ => Self::with_values(&rows, system.q),
+            _ => Self::with_values(&rows, system.q).ok_or(OTHER),
         }
     }
 
     /// `M = [0 K; Lᵀ 0]` in some order: the graph of its entries has two sides.
-    fn of_costs(rows: &[Vec<(usize, f64)>], q: &[f64]) -> Option<Self> {
+    fn of_costs(rows: &[Vec<(usize, f64)>], q: &[f64]) -> Result<Self, &'static str> {
         let n = q.len();
         // A strategy may cost nothing by its own row, and be told by the others'.
         let mut columns = vec![vec![]; n];
@@ -76,31 +80,40 @@ impl Game {
             row.iter().for_each(|&(j, x)| columns[j].push((i, x)));
         }
         let mut side: Vec<Option<usize>> = vec![None; n];
-        let mut left = vec![0];
-        side[0] = Some(0);
-        while let Some(i) = left.pop() {
-            for &(j, x) in rows[i].iter().chain(&columns[i]) {
-                let other = 1 - side[i]?;
-                match side[j] {
-                    _ if x < 0.0 => return None,
-                    None => {
-                        side[j] = Some(other);
-                        left.push(j);
+        let mut parts = 0;
+        for first in 0..n {
+            if side[first].is_some() {
+                continue;
+            }
+            // A strategy that meets no other is none.
+            if rows[first].is_empty() && columns[first].is_empty() {
+                return Err(OTHER);
+            }
+            parts += 1;
+            side[first] = Some(0);
+            let mut left = vec![(first, 0)];
+            while let Some((i, own)) = left.pop() {
+                for &(j, x) in rows[i].iter().chain(&columns[i]) {
+                    match side[j] {
+                        _ if x < 0.0 => return Err(OTHER),
+                        None => {
+                            side[j] = Some(1 - own);
+                            left.push((j, 1 - own));
+                        }
+                        Some(s) if s == own => return Err(OTHER),
+                        Some(_) => {}
                     }
-                    Some(s) if s != other => return None,
-                    Some(_) => {}
                 }
             }
         }
+        if parts > 1 {
+            return Err(PARTS);
+        }
         let of = |s| (0..n).filter(|&i| side[i] == Some(s)).collect::<Vec<_>>();
         let strategies = [of(0), of(1)];
-        let all = strategies[0].len() + strategies[1].len() == n;
-        if !all || strategies.iter().any(Vec::is_empty) {
-            return None;
-        }
         // A row over its right-hand side is the same condition.
         let costs = costs(rows, &strategies, |i, x| x / -q[i]);
-        Some(Self { strategies, costs, values: None })
+        Ok(Self { strategies, costs, values: None })
     }
 
     /// `0 ≤ x ⟂ d₁ v₁ + K y ≥ 0`, `0 ≤ y ⟂ d₂ v₂ + Lᵀ x ≥ 0`, `Σ x = s₁`, `Σ y = s₂`; K and L of any signs, d₁ and d₂ not zero.
@@ -209,5 +222,5 @@ fn costs(
 
 /// Whether a problem states a game.
 pub fn is_game<P: Complementary>(problem: &P) -> bool {
-    problem.system().is_ok_and(|system| Game::of(&system).is_some())
+    problem.system().is_ok_and(|system| Game::of(&system).is_ok())
 }

@@ -190,10 +190,9 @@ impl<P: Complementary> Solver<P> for LemkeHowson {
     type Work = LemkeHowsonWork;
 
     fn work(&self, problem: &P) -> Result<LemkeHowsonWork, SolveError> {
-        let none =
-            || SolveError::needs("a bimatrix game (see `nonsmooth list`)", "another problem");
+        let none = |found| SolveError::needs("a bimatrix game (see `nonsmooth list`)", found);
         let system = problem.system()?;
-        let game = Game::of(&system).ok_or_else(none)?;
+        let game = Game::of(&system).map_err(none)?;
         let refuting = refuting_row(&system, &mut vec![]);
         let (a, b) = game.payoffs();
         let walk = Walk::new(&a, &b)?;

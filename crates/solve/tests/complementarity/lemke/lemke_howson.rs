@@ -119,6 +119,29 @@ fn games_are_recognised_and_solved_as_problems() {
 
 /// Strategies that cost nothing by their own row, or by those of the other player.
 #[test]
+fn games_side_by_side_are_told_from_other_problems() {
+    use nonsmooth_solve::{Limits, registry};
+    let said = |m: [[f64; 4]; 4]| {
+        let m = Dense::from_rows(&m).unwrap();
+        let problem = nonsmooth_problem::Lcp::new(m, vec![-1.0; 4]).unwrap();
+        let mut session =
+            registry::session::<nonsmooth_problem::Lcp>("lemke_howson", &Default::default())
+                .unwrap();
+        let mut point = nonsmooth_problem::LcpPoint { z: vec![0.0; 4] };
+        let solved = session.solve(&problem, &mut point, &Limits::default(), &mut |_| {});
+        solved.unwrap_err().to_string()
+    };
+    let [a, b] = [[0.0, 1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]];
+    let two = said([a, b, [0.0, 0.0, 0.0, 2.0], [0.0, 0.0, 1.0, 0.0]]);
+    assert!(two.contains("found games that have no strategy in common"), "{two}");
+    // A row that meets no other, and a circle of three.
+    for rest in [[[0.0; 4]; 2], [[1.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]]] {
+        let other = said([a, [1.0, 0.0, 1.0, 0.0], rest[0], rest[1]]);
+        assert!(other.contains("found another problem"), "{other}");
+    }
+}
+
+#[test]
 fn zero_rows_and_columns_are_part_of_a_game() {
     use nonsmooth_problem::Lcp;
     use nonsmooth_solve::{Solve, Status};

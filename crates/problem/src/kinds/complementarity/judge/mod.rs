@@ -27,10 +27,10 @@ pub(crate) const SMALLER: f64 = 1e-3;
 
 /// `x − P(x − w)`, P the projection on `[l, u]`. Zero where x and w obey the law.
 pub(crate) fn natural(x: f64, w: f64, l: f64, u: f64) -> f64 {
-    // The smaller of the two differences is computed without the larger.
-    if x - w <= l {
+    // The smaller of the two differences is computed without the larger. A bound that is infinite is none, though x may be beyond the doubles.
+    if x - w <= l && l > f64::NEG_INFINITY {
         x - l
-    } else if x - w >= u {
+    } else if x - w >= u && u < f64::INFINITY {
         x - u
     } else {
         w
@@ -184,7 +184,8 @@ pub(crate) struct Sum {
 impl Sum {
     pub(crate) fn new(norm_q: f64) -> Self {
         Self {
-            unit: if norm_q > 0.0 { norm_q } else { 1.0 },
+            // Beyond the doubles the largest of them, within a small factor.
+            unit: if norm_q > 0.0 { norm_q.min(f64::MAX) } else { 1.0 },
             scaled: 0.0,
             plain: 0.0,
             primal: 0.0,

@@ -407,6 +407,11 @@ impl GlobalGauge {
         self.own.high.split_at(n)
     }
 
+    /// What the contact law's residual needs.
+    pub(super) fn law(&self) -> &LawGauge {
+        &self.law
+    }
+
     /// The velocity of the last point measured.
     pub(super) fn velocity(&self) -> &[f64] {
         &self.u

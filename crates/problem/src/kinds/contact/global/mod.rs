@@ -245,6 +245,10 @@ impl<const D: usize, L: Law<D>> Problem for FrictionGlobal<D, L> {
         gauge.measure_weighed(self, point, true)
     }
 
+    fn tidy(&self, point: &mut GlobalPoint, gauge: &mut Self::Gauge, boldly: bool) -> bool {
+        gauge.law().tidy::<L, D>(&mut point.r, boldly)
+    }
+
     fn follow_impulses(&self, point: &mut GlobalPoint, gauge: &mut Self::Gauge) -> bool {
         let (v, lambda) = gauge.motion(self.dofs());
         if v.iter().chain(lambda).any(|x| !x.is_finite()) {

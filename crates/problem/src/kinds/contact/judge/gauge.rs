@@ -1,7 +1,7 @@
 //! The residuals of the contact law, which all judges of contacts share.
 
 use super::contact::{Law, Share, length};
-use super::loads::Loads;
+use super::loads::{Loads, ROUNDING};
 use crate::check::{Measure, Motion, StatusCounts, Verdict, over};
 use nonsmooth_linalg::{Real, norm, norm_of, power_of_two, small};
 
@@ -68,6 +68,9 @@ pub(crate) struct LawGauge {
     with_rows: Option<(f64, f64)>,
 }
 
+/// Solvers leave at most so much of the loads where there is nothing: what rounding makes of matrices that are ill conditioned by 1e3.
+const AT_MOST: f64 = 1e-12;
+
 /// The part of the loads that q counts at least where scalar rows take up some of them.
 const OF_LOADS: f64 = 1e-6;
 
@@ -120,6 +123,23 @@ impl LawGauge {
     /// What the residual is relative to.
     pub(crate) fn unit(&self) -> f64 {
         if self.norm_q > 0.0 { self.norm_q } else { 1.0 }
+    }
+
+    /// Sets impulses to zero whose answer, by what a contact does to itself, is lost in the rounding of the loads that reach it: beside others of any size they are zero but for rounding, and yet all that
+    /// their contact is measured by. Whether there are any.
+    pub(crate) fn tidy<L: Law<D>, const D: usize>(&self, r: &mut [f64], boldly: bool) -> bool {
+        let rounding = if boldly { AT_MOST } else { ROUNDING };
+        // Moments are in other units, and no larger than the impulses allow.
+        let of_force = 1 + (D - 1) / L::DISKS;
+        let mut changed = false;
+        for (c, block) in r.chunks_exact_mut(D).enumerate() {
+            let (answer, load) = (self.own_w(c) * norm(&block[..of_force]), self.loads.reaching(c));
+            if answer > 0.0 && answer <= rounding * load && load.is_finite() {
+                block.fill(0.0);
+                changed = true;
+            }
+        }
+        changed
     }
 
     /// Whether the sum of the natural map's squares in plain arithmetic, the first that decides, lets the impulses pass at `tolerance`.

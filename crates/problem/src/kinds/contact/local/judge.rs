@@ -274,6 +274,11 @@ impl LocalGauge {
         Some(share)
     }
 
+    /// What the contact law's residual needs.
+    pub(super) fn law(&self) -> &LawGauge {
+        &self.law
+    }
+
     /// The velocity of the last point measured.
     pub(super) fn velocity(&self) -> &[f64] {
         &self.u

@@ -253,6 +253,10 @@ impl<const D: usize, L: Law<D>> Problem for FrictionLocal<D, L> {
         gauge.measure_weighed(self, point, true)
     }
 
+    fn tidy(&self, point: &mut LocalPoint, gauge: &mut Self::Gauge, boldly: bool) -> bool {
+        gauge.law().tidy::<L, D>(&mut point.r, boldly)
+    }
+
     fn accept(
         &self,
         point: &LocalPoint,

@@ -1,0 +1,179 @@
+//! Solids that lie deep inside a closed mesh or below a heightfield, where no triangle says more by itself than that it is far.
+//!
+//! A body that moves farther in a step than it is large ends behind the surface as a whole, as it would behind a plane, and so does a point that has sunk by rounding. It touches then
+//! along the normal of the plane face nearest to its middle, however deep, so that it goes no deeper. The nearest point of the surface tells the side: the mean of the normals there, each by the angle
+//! of its triangle, points outwards from it exactly if it is seen from outside.
+//!
+//! References: BaerentzenAanaes2005.
+//! Cost: a descent in the tree of triangles, O(log n) of a point near the surface; the body's other pairs cost nothing.
+
+use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
+
+use crate::detect::broad::Aabb;
+use crate::detect::clip::Clip;
+use crate::detect::convex::{self, Side};
+use crate::detect::segments::Segment;
+use crate::detect::surface::{Scratch, Surface, Thin};
+use crate::detect::witness::{Anchor, Feature, Witness};
+use crate::rotation::Pose;
+
+/// Feet nearer to each other than this share of the surface's size are one.
+const SAME: f64 = 1e-9;
+
+/// The point of a surface that is nearest to a given one.
+struct Foot {
+    far: f64,
+    at: Vec3,
+    /// The triangle at it whose plane is farthest from the given point, and how far in front of that it is.
+    triangle: u32,
+    height: f64,
+    /// The normals of the triangles at it, each by its angle.
+    outwards: Vec3,
+    /// Within a triangle, or on an edge that has one on one side only.
+    within: bool,
+    on_border: bool,
+}
+
+impl Foot {
+    fn is_below(&self, x: Vec3) -> bool {
+        match self.within {
+            true => self.height < 0.0,
+            false => !self.on_border && dot(self.outwards, sub(x, self.at)) < 0.0,
+        }
+    }
+}
+
+impl Surface {
+    /// The points where a solid that overlaps the surface, which has nothing that met it, touches nevertheless; `bounds` is the box of the solid, in the world.
+    pub(super) fn catch(
+        &self,
+        (pose, other, bounds): (&Pose, &Side, &Aabb),
+        prediction: f64,
+        (clip, scratch): (&mut Clip, &mut Scratch),
+        found: &mut impl FnMut([Feature; 2], Witness),
+    ) {
+        let middle = pose.local_point(other.middle());
+        let Some(foot) = self.foot(middle) else { return };
+        let is_below = foot.is_below(middle);
+        if let Side::Rod { local, world, radius, .. } = other
+            && world.d == [0.0; 3]
+        {
+            if is_below {
+                let normal = self.normals[foot.triangle as usize];
+                let below = sub(middle, scale(foot.height, normal));
+                let witness = Witness::Face {
+                    on_a: true,
+                    normal,
+                    other: local.p,
+                    foot: below,
+                    radius: *radius,
+                    anchor: Anchor::Other,
+                };
+                found([self.named(foot.triangle, Feature::Face(0)), Feature::Curved(0)], witness);
+            }
+            return;
+        }
+        // Above the surface the way from the middle to a point of the solid behind the triangle leads through that.
+        if !is_below && !foot.within {
+            return;
+        }
+        let reach = foot.far + other.size();
+        let wide =
+            Aabb { low: bounds.low.map(|x| x - reach), high: bounds.high.map(|x| x + reach) };
+        let mut near = std::mem::take(&mut scratch.near);
+        self.near(pose, &wide, &mut near);
+        let face = self.faces[foot.triangle as usize];
+        for &t in near.iter().filter(|&&t| self.faces[t as usize] == face) {
+            self.template(t, pose, &mut scratch.thin);
+            let Thin { hull, posed } = &scratch.thin;
+            let mut keep = |[feature, own]: [Feature; 2], witness: Witness| {
+                let feature = self.named(t, feature);
+                if !self.is_flat(feature) {
+                    found([feature, own], witness);
+                }
+            };
+            if let Side::Hull { hull: h, posed: p, pose: q } = other {
+                let (first, second) = ((hull, posed, pose), (*h, *p, *q));
+                clip.on_face(first, second, 0, prediction, keep);
+            } else if let Some(flat) = (Side::Hull { hull, posed, pose }).flat(posed.normals[0]) {
+                convex::on_flat(&flat, true, other, prediction, &mut keep);
+            }
+        }
+        scratch.near = near;
+    }
+
+    /// The point of the surface that is nearest to x, in the frame of the body.
+    fn foot(&self, x: Vec3) -> Option<Foot> {
+        let same = SAME * self.size;
+        let mut best: Option<Foot> = None;
+        let mut stack = vec![(0.0, 0_u32)];
+        while let Some((far, k)) = stack.pop() {
+            if best.as_ref().is_some_and(|b| far > b.far + same) {
+                continue;
+            }
+            let node = &self.tree[k as usize];
+            if node.count > 0 {
+                for &t in &self.order[node.first as usize..(node.first + node.count) as usize] {
+                    self.compare(t, x, same, &mut best);
+                }
+                continue;
+            }
+            let mut children = [node.first, node.first + 1]
+                .map(|child| (self.tree[child as usize].bounds.distance(x), child));
+            // The nearer one comes first off the stack.
+            children.sort_by(|a, b| b.0.total_cmp(&a.0));
+            stack.extend(children);
+        }
+        best
+    }
+
+    /// Takes triangle t for the nearest one, or adds its normal where it has the same foot.
+    fn compare(&self, t: u32, x: Vec3, same: f64, best: &mut Option<Foot>) {
+        let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
+        let n = self.normals[t as usize];
+        let height = dot(n, sub(x, corners[0]));
+        let border = |k: usize| self.edges[self.sides[t as usize][k] as usize].0[1] == u32::MAX;
+        let inwards = |k: usize| cross(n, sub(corners[(k + 1) % 3], corners[k]));
+        let (mut at, mut within, mut on_border, mut angle) =
+            (sub(x, scale(height, n)), true, false, 0.0);
+        if (0..3).any(|k| dot(inwards(k), sub(x, corners[k])) < 0.0) {
+            let mut far = f64::INFINITY;
+            for k in 0..3 {
+                let side = Segment::between(corners[k], corners[(k + 1) % 3]);
+                let s = side.nearest(x);
+                let point = side.at(s);
+                if norm(sub(x, point)) >= far {
+                    continue;
+                }
+                (far, at, within) = (norm(sub(x, point)), point, false);
+                // At a corner two sides of the triangle end, of which either may be a border.
+                (on_border, angle) = match s {
+                    0.0 => (border(k) || border((k + 2) % 3), self.angle(t, k)),
+                    1.0 => (border(k) || border((k + 1) % 3), self.angle(t, (k + 1) % 3)),
+                    _ => (border(k), std::f64::consts::PI),
+                };
+            }
+        }
+        let far = norm(sub(x, at));
+        let outwards = scale(angle, n);
+        match best {
+            Some(b) if far > b.far + same => {}
+            Some(b) if !within && !b.within && norm(sub(at, b.at)) <= same => {
+                b.outwards = add(b.outwards, outwards);
+                b.on_border |= on_border;
+                if height.abs() > b.height.abs() {
+                    (b.triangle, b.height) = (t, height);
+                }
+            }
+            Some(b) if far >= b.far => {}
+            _ => *best = Some(Foot { far, at, triangle: t, height, outwards, within, on_border }),
+        }
+    }
+
+    /// The angle of triangle t at its corner k.
+    fn angle(&self, t: u32, k: usize) -> f64 {
+        let corner = |i: usize| self.vertices[self.triangles[t as usize][i % 3] as usize];
+        let (u, v) = (sub(corner(k + 1), corner(k)), sub(corner(k + 2), corner(k)));
+        norm(cross(u, v)).atan2(dot(u, v))
+    }
+}
