@@ -6,6 +6,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use nonsmooth_bench::campaign::Journal;
 use nonsmooth_io::{
     About, FORMATS, Format, ProblemFile, beside, format, listed, named, sniffed, writer,
 };
@@ -322,9 +323,13 @@ pub fn writable(option: &str, path: &Path) -> Result<(), String> {
         Ok(_) => {
             let there = OpenOptions::new().append(true).open(path).map_err(refused)?;
             if matches!(there.try_lock(), Err(fs::TryLockError::WouldBlock)) {
+                let found = match Journal::is(path) {
+                    true => "a campaign writes",
+                    false => "another program has open",
+                };
                 let path = path.display();
                 return Err(format!(
-                    "{option} {path}: expected a file of its own, found one that a campaign writes"
+                    "{option} {path}: expected a file of its own, found one that {found}"
                 ));
             }
         }
@@ -400,6 +405,25 @@ pub fn apart<'a, 'b>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn locked_files_are_of_a_campaign_only_where_they_begin_as_one() {
+        let path = std::env::temp_dir().join(format!("nonsmooth-locked-{}", std::process::id()));
+        for (text, words) in [
+            ("\u{89}HDF", "found one that another program has open"),
+            ("{\"line\":\"campaign\",\"id\":\"a\"}\n", "found one that a campaign writes"),
+        ] {
+            fs::write(&path, text).unwrap();
+            let held = fs::File::open(&path).unwrap();
+            held.try_lock().unwrap();
+            let said = writable("--out", &path).unwrap_err();
+            // Where locks keep readers away nothing is known of the file.
+            assert!(said.ends_with(words) || cfg!(windows), "{said}");
+            drop(held);
+            assert!(writable("--out", &path).is_ok());
+        }
+        fs::remove_file(&path).unwrap();
+    }
 
     #[test]
     fn sizes_have_units() {

@@ -324,6 +324,23 @@ impl<'a> Import<'a> {
             Some(p) => add(first.position, apply(&frame, p)),
             None => first.position,
         };
+        let needed = match kind {
+            "revolute" | "cylindrical" => [1, 1],
+            "prismatic" => [0, 1],
+            "spherical" => [1, 0],
+            _ => [0, 0],
+        };
+        for (needed, found, name, old) in [
+            (needed[0], joint.points.len(), "points", "pivot_point"),
+            (needed[1], joint.axes.len(), "axes", "axis"),
+        ] {
+            if found < needed {
+                return Err(format!(
+                    "{place}: expected {needed} in `{name}` of a {} (`{old}` of files from before `{name}` is not read), found {found}",
+                    joint.kind
+                ));
+            }
+        }
         // A joint between two that stand is none.
         if first.mass.is_none() && second.is_none_or(|o| o.mass.is_none()) {
             return Err(format!("{place}: expected an object that moves, found none"));
@@ -506,6 +523,7 @@ impl<'a> Contacts<'a> {
                 said.push(format!("{place}: it stands in place of `{}`", old.name));
             }
         }
+        said.extend(out.lawless(file));
         out.fremond = kinds == BTreeSet::from([true]);
         if kinds.len() > 1 {
             said.push(
@@ -517,6 +535,40 @@ impl<'a> Contacts<'a> {
 
     fn meet(&self, a: i64, b: i64) -> bool {
         self.laws.contains_key(&(a.min(b), a.max(b)))
+    }
+
+    /// Says which groups of two bodies that meet have no law. There their contactors pass through each other, here bodies meet as a whole.
+    fn lawless(&self, file: &MechanicsScene) -> Vec<String> {
+        // Of each combination of groups two bodies are enough.
+        let mut kinds: BTreeMap<(BTreeSet<i64>, bool), Vec<&MechanicsObject>> = BTreeMap::new();
+        for object in file.objects.iter().filter(|o| o.birth.is_none()) {
+            let groups = object.contactors.iter().map(|c| c.group).collect();
+            let like = kinds.entry((groups, object.mass.is_some())).or_default();
+            if like.len() < 2 {
+                like.push(object);
+            }
+        }
+        let all: Vec<_> =
+            kinds.iter().flat_map(|(kind, like)| like.iter().map(move |o| (kind, *o))).collect();
+        let mut found: BTreeMap<(i64, i64), String> = BTreeMap::new();
+        for (k, &((own, moves), one)) in all.iter().enumerate() {
+            for &((others, move_too), two) in &all[k + 1..] {
+                let pairs = || own.iter().flat_map(|&a| others.iter().map(move |&b| (a, b)));
+                if !(*moves || *move_too) || !pairs().any(|(a, b)| self.meet(a, b)) {
+                    continue;
+                }
+                for (a, b) in pairs().filter(|&(a, b)| !self.meet(a, b)) {
+                    let names = format!("`{}` and `{}`", one.name, two.name);
+                    found.entry((a.min(b), a.max(b))).or_insert(names);
+                }
+            }
+        }
+        let say = |((a, b), names): (&(i64, i64), &String)| {
+            format!(
+                "/data/nslaws: none of groups {a} and {b}, and {names}, which have them, meet by other groups: `simulate` asks for one in `pairs`"
+            )
+        };
+        found.iter().map(say).collect()
     }
 
     /// Whether all that may meet have a law.
@@ -560,6 +612,93 @@ impl<'a> Contacts<'a> {
         }
         if self.fremond {
             scene["integrator"] = json!({"impact": "fremond"});
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nonsmooth_io::siconos::MechanicsShape;
+    use nonsmooth_simulate::SceneFile;
+
+    use super::*;
+
+    /// A ball with contactors of the groups on a floor of group 0; a law of groups 0 and 1.
+    fn ball(groups: &[i64]) -> MechanicsScene {
+        let primitive = |name: &str, kind: &str, size: &[f64]| MechanicsShape {
+            name: name.into(),
+            form: MechanicsForm::Primitive { kind: kind.into(), size: size.into() },
+            outside_margin: 0.0,
+        };
+        let object = |name: &str, mass, shape: &str, groups: &[i64]| MechanicsObject {
+            name: name.into(),
+            mass,
+            rotation: [1.0, 0.0, 0.0, 0.0],
+            contactors: groups
+                .iter()
+                .map(|&group| MechanicsContactor {
+                    shape: shape.into(),
+                    group,
+                    rotation: [1.0, 0.0, 0.0, 0.0],
+                    ..MechanicsContactor::default()
+                })
+                .collect(),
+            ..MechanicsObject::default()
+        };
+        MechanicsScene {
+            dimension: 3,
+            shapes: vec![primitive("S", "Sphere", &[0.5]), primitive("B", "Box", &[1.0; 3])],
+            objects: vec![object("floor", None, "B", &[0]), object("ball", Some(1.0), "S", groups)],
+            laws: vec![MechanicsLaw {
+                name: "law".into(),
+                kind: "NewtonImpactNSL".into(),
+                groups: [0, 1],
+                ..MechanicsLaw::default()
+            }],
+            ..MechanicsScene::default()
+        }
+    }
+
+    #[test]
+    fn bodies_that_meet_by_groups_without_a_law_are_named() {
+        let simulated = |made: &Imported| SceneFile::parse(&made.scene, &[]).unwrap().world();
+        for (groups, lawless) in [(&[1, 2][..], true), (&[1], false), (&[2], false)] {
+            let made = scene(&ball(groups)).unwrap();
+            let said = made.warnings.iter().any(|w| {
+                w.contains("none of groups 0 and 2, and `floor` and `ball`, which have them, meet")
+            });
+            assert_eq!((said, simulated(&made).is_err()), (lawless, lawless), "{groups:?}");
+        }
+    }
+
+    #[test]
+    fn joints_without_their_points_and_axes_are_refused() {
+        for (kind, points, axes) in
+            [("PivotJointR", 1, 1), ("CylindricalJointR", 1, 1), ("KneeJointR", 1, 0)]
+                .into_iter()
+                .chain([("PrismaticJointR", 0, 1), ("FixedJointR", 0, 0)])
+        {
+            let with = |points: usize, axes: usize| {
+                let mut file = ball(&[1]);
+                file.joints.push(MechanicsJoint {
+                    name: "j".into(),
+                    kind: kind.into(),
+                    objects: ("ball".into(), None),
+                    points: vec![[0.0, 0.0, 1.0]; points],
+                    axes: vec![[0.0, 1.0, 0.0]; axes],
+                    ..MechanicsJoint::default()
+                });
+                scene(&file)
+            };
+            assert!(with(points, axes).is_ok(), "{kind}");
+            let expected =
+                |name: &str| format!("/data/joints/j: expected 1 in `{name}` of a {kind}");
+            if points > 0 {
+                assert!(with(0, axes).is_err_and(|e| e.starts_with(&expected("points"))), "{kind}");
+            }
+            if axes > 0 {
+                assert!(with(points, 0).is_err_and(|e| e.starts_with(&expected("axes"))), "{kind}");
+            }
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The file of a campaign: lines are appended and never lost, and a campaign that was ended goes on from it.
 
 use std::fs::{File, OpenOptions};
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::record::{Campaign, Line};
@@ -99,6 +99,13 @@ impl Journal {
             std::fs::TryLockError::Error(e) => refusal(path, &e),
         })?;
         Ok(Self { path: path.into(), file, campaign: String::new() })
+    }
+
+    /// Whether a file can be read and begins as one of runs does.
+    pub fn is(path: &Path) -> bool {
+        let mut begins = [0; BEGINNING.len()];
+        let read = File::open(path).and_then(|mut file| file.read_exact(&mut begins));
+        read.is_ok() && begins == BEGINNING
     }
 
     /// The name of the campaign that new runs belong to.

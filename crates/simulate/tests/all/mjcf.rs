@@ -198,6 +198,165 @@ fn balls_of_six_dimensions_resist_rolling() {
     }
 }
 
+/// Of lists that end early MuJoCo keeps the numbers of the class, of the classes around it, and those built in.
+#[test]
+fn short_lists_keep_what_classes_say_beyond_their_end() {
+    let model = |geom: &str| {
+        import(&format!(
+            r#"<mujoco><default>
+              <geom type="capsule" size="0.1 0.5" friction="0.5 0.1 0.05" condim="6"/>
+              <default class="wet"><geom friction="0.3"/></default>
+            </default><worldbody><body><freejoint/><geom {geom}/></body></worldbody></mujoco>"#
+        ))
+    };
+    for (geom, [radius, half, mu, rolling]) in [
+        (r#"friction="0.8""#, [0.1, 0.5, 0.8, 0.05]),
+        (r#"class="wet" size="0.2""#, [0.2, 0.5, 0.3, 0.05]),
+        (r#"class="wet" size="0.2 0.3" friction="0.4 0 0.01""#, [0.2, 0.3, 0.4, 0.01]),
+    ] {
+        let scene = table(&model(geom));
+        let shape = &scene["bodies"][0]["shapes"][0]["shape"];
+        let law = &scene["pairs_default"];
+        let found = [&shape["radius"], &shape["half_length"], &law["mu"], &law["mu_rolling"]];
+        near(&found.map(toml::Value::clone).to_vec().into(), &[radius, half, mu, rolling]);
+    }
+    let follows = |poly: &str| {
+        let made = import(&format!(
+            r#"<mujoco><default><equality polycoef="0 2 0"/></default><worldbody>
+              <body><joint name="h"/><geom pos="1 0 0" size="0.1"/></body>
+              <body pos="0 3 0"><joint name="k"/><geom pos="1 0 0" size="0.1"/></body>
+            </worldbody><equality><joint joint1="h" joint2="k" {poly}/></equality></mujoco>"#
+        ));
+        table(&made)["couplings"][0]["terms"][1]["weight"].as_float()
+    };
+    assert_eq!(follows(r#"polycoef="0""#), Some(-2.0));
+    assert_eq!(follows(r#"polycoef="0 3""#), Some(-3.0));
+    let long = "<mujoco><worldbody><geom size='1 1 1 1'/></worldbody></mujoco>";
+    let error = mjcf(long, Path::new("")).unwrap_err().to_string();
+    assert_eq!(error, "<geom> (line 1): expected at most 3 numbers as `size`, found 4");
+}
+
+/// Actuators of all kinds have one default in a class. Of gain and bias a shorthand takes over what the same or `general` said last, else what the classes around
+/// say. The numbers are those that MuJoCo compiles.
+#[test]
+fn actuators_of_a_class_share_their_default() {
+    let model = |defaults: &str, actuator: &str| {
+        import(&format!(
+            "<mujoco><default>{defaults}</default><worldbody><body><joint name='j'/>\
+             <geom pos='1 0 0' size='0.1'/></body></worldbody>\
+             <actuator><{actuator} joint='j'/></actuator></mujoco>"
+        ))
+    };
+    let servo = "<position kp='20' kv='3'/>";
+    let general = "<general gainprm='50' biasprm='0 -50 -5'/>";
+    let inner = "<default class='c'><velocity kv='4'/></default>";
+    for (defaults, actuator, stiffness, damping) in [
+        ("<motor gear='3' forcerange='-1 1'/>", "position kp='10'", Some(90.0), 0.0),
+        (general, "position", Some(50.0), 5.0),
+        (general, "position kp='10'", Some(10.0), 5.0),
+        (general, "velocity", None, 50.0),
+        (servo, "position kv='2'", Some(20.0), 2.0),
+        (servo, "velocity", None, 1.0),
+        (&format!("{servo}<motor/>"), "position", Some(1.0), 0.0),
+        (&format!("{servo}<general gainprm='5'/>"), "position", Some(5.0), 3.0),
+        (&format!("{servo}{inner}"), "position class='c'", Some(20.0), 3.0),
+        (&format!("{servo}{inner}"), "velocity class='c'", None, 4.0),
+    ] {
+        let made = model(defaults, actuator);
+        let motor = &table(&made)["joints"][0]["motor"];
+        let found = (motor.get("stiffness").and_then(toml::Value::as_float), &motor["damping"]);
+        assert_eq!(found, (stiffness, &damping.into()), "{defaults} {actuator}");
+        assert!(!said(&made, "is left out"), "{:?}", made.warnings);
+        let max = motor.get("max").and_then(toml::Value::as_float);
+        assert_eq!(max, defaults.contains("forcerange").then_some(3.0));
+    }
+    for (defaults, words) in [
+        ("<general biasprm='0 -1 1'/>", "<position> (line 1): `dampratio` is left out"),
+        ("<position timeconst='1'/>", "<position> (line 1): `timeconst` is left out"),
+        ("<general gaintype='affine' gainprm='2 3'/>", ": what <general> (line 1) says of gain"),
+        ("<muscle/><general gear='1'/>", ": what <muscle> (line 1) says of gain and bias is left"),
+    ] {
+        let made = model(defaults, "position");
+        assert!(said(&made, words), "{words}: {:?}", made.warnings);
+    }
+}
+
+#[test]
+fn keyframes_place_bodies_that_are_led_and_open_welds_are_named() {
+    let model = |key: &str| {
+        format!(
+            r#"<mujoco><worldbody>
+              <body name="hand" mocap="true" pos="0 0 1"><geom size="0.1"/>
+                <body name="finger" pos="1 0 0"><geom size="0.1"/></body></body>
+              <body name="ball" pos="0 0 5"><freejoint/><geom size="0.1"/></body>
+            </worldbody><equality><weld body1="hand" body2="ball"/></equality>
+            <keyframe><key {key}/></keyframe></mujoco>"#
+        )
+    };
+    let places = |key: &str| {
+        let made = import(&model(key));
+        let scene = table(&made);
+        let of = |k: usize| scene["bodies"][k]["position"].clone();
+        ([of(0), of(1), of(2)], made)
+    };
+    // Half a turn about the third axis.
+    let (at, _) = places(r#"mpos="1 2 3" mquat="0 0 0 2""#);
+    near(&at[0], &[1.0, 2.0, 3.0]);
+    near(&at[1], &[0.0, 2.0, 3.0]);
+    near(&at[2], &[0.0, 0.0, 5.0]);
+    let (at, made) = places(r#"mpos="1 2 3" qpos="1 2 7 1 0 0 0""#);
+    near(&at[1], &[2.0, 2.0, 3.0]);
+    near(&at[2], &[1.0, 2.0, 7.0]);
+    assert!(!said(&made, "open by"), "{:?}", made.warnings);
+    let (_, made) = places(r#"qpos="0 0 5 0 2 0 0""#);
+    assert!(said(&made, "<weld> (line 5): open by 8.0e0 m and 3.1e0 rad"), "{:?}", made.warnings);
+    let (_, made) = places(r#"mquat="0 0 0 1""#);
+    assert!(said(&made, "<weld> (line 5): open by 3.1e0 rad where"), "{:?}", made.warnings);
+    for (key, error) in [
+        (r#"mpos="1 2""#, "<key> (line 6): expected 3 numbers as `mpos`, found 2"),
+        (r#"mquat="0 0 0 0""#, "<key> (line 6): expected a quaternion in the keyframe, found zero"),
+    ] {
+        assert_eq!(mjcf(&model(key), Path::new("")).unwrap_err().to_string(), error);
+    }
+}
+
+/// Masses are always of the geoms in the range, but of a body that has none with a mass there.
+#[test]
+fn an_inertial_counts_where_no_geom_has_a_mass() {
+    for (always, geom, mass) in [
+        ("true", "group='0'", 7.0),
+        ("true", "group='2' mass='3'", 3.0),
+        ("true", "group='2' mass='0'", 7.0),
+        ("auto", "group='2' mass='3'", 7.0),
+        ("false", "group='2' mass='3'", 7.0),
+    ] {
+        let made = import(&format!(
+            "<mujoco><compiler inertiafromgeom='{always}' inertiagrouprange='2 3'/><worldbody><body>\
+             <freejoint/><frame pos='0 0 1'><inertial pos='1 2 3' mass='7' diaginertia='1 1 1'/></frame>\
+             <geom size='0.1' {geom}/></body></worldbody></mujoco>"
+        ));
+        let body = &table(&made)["bodies"][0];
+        assert_eq!(body["mass"].as_float(), Some(mass), "{always} {geom}");
+        near(&body["position"], if mass == 7.0 { &[1.0, 2.0, 4.0] } else { &[0.0; 3] });
+    }
+}
+
+#[test]
+fn a_flag_takes_gravity_away_wherever_it_stands() {
+    let gravity = |options: &str| {
+        let made = import(&format!(
+            "<mujoco>{options}<worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
+        ));
+        table(&made)["gravity"].clone()
+    };
+    let off = "<option><flag gravity='disable'/></option>";
+    let down = "<option gravity='0 0 -1'/>";
+    near(&gravity(&format!("{off}{down}")), &[0.0; 3]);
+    near(&gravity(&format!("{down}{off}")), &[0.0; 3]);
+    let on = "<option><flag gravity='enable'/></option>";
+    near(&gravity(&format!("{off}{down}{on}")), &[0.0, 0.0, -1.0]);
+}
+
 #[test]
 fn equalities_are_joints_and_couplings() {
     let made = import(

@@ -25,6 +25,8 @@ pub(super) struct Compiler {
     pub meshdir: String,
     pub assetdir: String,
     pub gravity: Vec3,
+    /// Whether a flag takes gravity away, whatever `gravity` says.
+    weightless: bool,
     pub h: f64,
     /// Whether parent and child pass through each other.
     pub filter: bool,
@@ -47,6 +49,7 @@ impl Compiler {
             meshdir: String::new(),
             assetdir: String::new(),
             gravity: [0.0, 0.0, -9.81],
+            weightless: false,
             h: 2e-3,
             filter: true,
         };
@@ -55,6 +58,9 @@ impl Compiler {
         }
         for element in root.named("option") {
             out.option(&defaults.item(element, MAIN)?, said)?;
+        }
+        if out.weightless {
+            out.gravity = [0.0; 3];
         }
         Ok(out)
     }
@@ -112,8 +118,9 @@ impl Compiler {
         for flag in item.element.named("flag") {
             for (name, text) in &flag.attributes {
                 match (name.as_str(), text.as_str()) {
-                    ("gravity", "disable") => self.gravity = [0.0; 3],
-                    ("filterparent", "disable") => self.filter = false,
+                    // The last of several flags holds.
+                    ("gravity", text) => self.weightless = text == "disable",
+                    ("filterparent", text) => self.filter = text != "disable",
                     (
                         "contact" | "limit" | "equality" | "frictionloss" | "passive" | "spring"
                         | "damper" | "constraint" | "actuation",

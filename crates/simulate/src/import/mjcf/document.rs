@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use roxmltree::{Document, Node};
 
+use super::servo::{ACTUATORS, Servo};
 use crate::SimulateError;
 
 /// Elements may stand in each other so deep.
@@ -153,7 +154,35 @@ type Attributes = BTreeMap<String, String>;
 
 /// The attributes that elements have where they say none, by class and tag.
 pub(super) struct Defaults {
-    classes: BTreeMap<String, BTreeMap<String, Attributes>>,
+    classes: BTreeMap<String, Class>,
+}
+
+/// What a class says, and those that it is in.
+#[derive(Clone)]
+struct Class {
+    parent: Option<String>,
+    tags: BTreeMap<String, Attributes>,
+    servo: Servo,
+}
+
+/// Lists that may end early: what is said further out holds beyond their end.
+const LISTS: [&str; 8] =
+    ["friction", "size", "polycoef", "gear", "gainprm", "biasprm", "stiffness", "damping"];
+
+/// A list with the numbers of another one beyond its end.
+fn laid(over: &str, under: &str) -> String {
+    let count = over.split_whitespace().count();
+    let words = over.split_whitespace().chain(under.split_whitespace().skip(count));
+    words.collect::<Vec<_>>().join(" ")
+}
+
+/// What elements with a tag have their defaults in common with.
+fn family(tag: &str) -> &str {
+    match tag {
+        "connect" | "weld" => "equality",
+        _ if ACTUATORS.contains(&tag) => "actuator",
+        _ => tag,
+    }
 }
 
 /// The class of elements that name none.
@@ -161,7 +190,8 @@ pub(super) const MAIN: &str = "main";
 
 impl Defaults {
     pub fn read(root: &Element) -> Result<Self, SimulateError> {
-        let mut out = Self { classes: BTreeMap::from([(MAIN.to_owned(), BTreeMap::new())]) };
+        let main = Class { parent: None, tags: BTreeMap::new(), servo: Servo::NONE };
+        let mut out = Self { classes: BTreeMap::from([(MAIN.to_owned(), main)]) };
         for top in root.named("default") {
             // The outermost one is of the main class, whatever it is called.
             out.class(top, MAIN, None)?;
@@ -179,13 +209,19 @@ impl Defaults {
         name: &str,
         parent: Option<&str>,
     ) -> Result<(), SimulateError> {
-        let mut own = match parent {
-            Some(parent) => self.classes[parent].clone(),
-            None => self.classes.remove(name).unwrap_or_default(),
-        };
+        let mut own = self.classes[parent.unwrap_or(name)].clone();
+        own.parent = parent.map(str::to_owned);
         for child in element.children.iter().filter(|e| e.tag != "default") {
-            let attributes = child.attributes.iter().map(|(k, v)| (k.clone(), v.clone()));
-            own.entry(child.tag.clone()).or_default().extend(attributes);
+            if family(&child.tag) == "actuator" {
+                let alone = Item { element: child, defaults: None };
+                own.servo = self.begun(&own, &child.tag).with(&alone)?;
+            }
+            let all = own.tags.entry(family(&child.tag).to_owned()).or_default();
+            for (name, text) in &child.attributes {
+                let under = all.get(name).filter(|_| LISTS.contains(&name.as_str()));
+                let text = under.map_or_else(|| text.clone(), |under| laid(text, under));
+                all.insert(name.clone(), text);
+            }
         }
         self.classes.insert(name.into(), own);
         for child in element.named("default") {
@@ -200,34 +236,41 @@ impl Defaults {
         Ok(())
     }
 
+    /// What an actuator of a class begins with: the class may have said something of another one last, then so much as the nearest class around it says.
+    fn begun<'a>(&'a self, mut class: &'a Class, actuator: &str) -> Servo {
+        while !class.servo.serves(actuator) {
+            let Some(parent) = &class.parent else { return Servo::NONE };
+            class = &self.classes[parent];
+        }
+        class.servo.clone()
+    }
+
+    fn of(&self, element: &Element, force: &str) -> Result<&Class, SimulateError> {
+        let class = element.attributes.get("class").map_or(force, String::as_str);
+        let found = self.classes.get(class);
+        found.ok_or_else(|| element.wrong("a class of <default>", format!("`{class}`")))
+    }
+
     /// An element with the defaults of its class, or else of the class that is in force where it stands.
     pub fn item<'a>(
         &'a self,
         element: &'a Element,
         force: &str,
     ) -> Result<Item<'a>, SimulateError> {
-        let class = element.attributes.get("class").map_or(force, String::as_str);
-        let Some(tags) = self.classes.get(class) else {
-            return Err(element.wrong("a class of <default>", format!("`{class}`")));
-        };
-        // What the shorthands of <general> have in common may be said of it.
-        let general = match element.tag.as_str() {
-            "motor" | "position" | "velocity" => tags.get("general"),
-            _ => None,
-        };
-        // Constraints of all kinds have one default.
-        let tag = match element.tag.as_str() {
-            "connect" | "weld" => "equality",
-            tag => tag,
-        };
-        Ok(Item { element, defaults: [tags.get(tag), general] })
+        let class = self.of(element, force)?;
+        Ok(Item { element, defaults: class.tags.get(family(&element.tag)) })
     }
 
     /// The same of an equality, whose tag `joint` would be that of a joint of a body.
     pub fn equality<'a>(&'a self, element: &'a Element) -> Result<Item<'a>, SimulateError> {
-        let item = self.item(element, MAIN)?;
-        let class = element.attributes.get("class").map_or(MAIN, String::as_str);
-        Ok(Item { defaults: [self.classes[class].get("equality"), None], ..item })
+        let class = self.of(element, MAIN)?;
+        Ok(Item { element, defaults: class.tags.get("equality") })
+    }
+
+    /// Gain and bias of an actuator.
+    pub fn servo(&self, element: &Element) -> Result<Servo, SimulateError> {
+        let class = self.of(element, MAIN)?;
+        self.begun(class, &element.tag).with(&Item { element, defaults: None })
     }
 }
 
@@ -235,20 +278,24 @@ impl Defaults {
 #[derive(Clone, Copy)]
 pub(super) struct Item<'a> {
     pub element: &'a Element,
-    defaults: [Option<&'a Attributes>; 2],
+    defaults: Option<&'a Attributes>,
 }
 
 impl<'a> Item<'a> {
+    /// What the element says, and what its class does.
+    fn said(&self, name: &str) -> [Option<&'a String>; 2] {
+        [self.element.attributes.get(name), self.defaults.and_then(|all| all.get(name))]
+    }
+
     pub fn text(&self, name: &str) -> Option<&'a str> {
-        let defaults = self.defaults.iter().flatten();
-        let own = std::iter::once(&self.element.attributes);
-        own.chain(defaults.copied()).find_map(|all| all.get(name)).map(String::as_str)
+        let [own, class] = self.said(name);
+        own.or(class).map(String::as_str)
     }
 
     /// The names of all its attributes, of the defaults too.
     pub fn names(&self) -> BTreeSet<&'a str> {
         let all = std::iter::once(&self.element.attributes);
-        let all = all.chain(self.defaults.iter().flatten().copied());
+        let all = all.chain(self.defaults);
         all.flat_map(|a| a.keys().map(String::as_str)).collect()
     }
 
@@ -262,12 +309,32 @@ impl<'a> Item<'a> {
 
     /// The numbers of an attribute, each finite, if it is there.
     pub fn numbers(&self, name: &str) -> Result<Option<Vec<f64>>, SimulateError> {
-        let Some(text) = self.text(name) else { return Ok(None) };
+        self.text(name).map(|text| self.read(name, text)).transpose()
+    }
+
+    fn read(&self, name: &str, text: &str) -> Result<Vec<f64>, SimulateError> {
         let words = text.split_whitespace();
         let read = words.map(|word| word.parse().ok().filter(|x: &f64| x.is_finite()));
         read.collect::<Option<Vec<f64>>>()
-            .map(Some)
             .ok_or_else(|| self.wrong(format!("finite numbers as `{name}`"), format!("`{text}`")))
+    }
+
+    /// One of [`LISTS`]: the numbers of the element, beyond them those of its class, beyond these the ones that are built in.
+    pub fn list<const N: usize>(
+        &self,
+        name: &str,
+        mut all: [f64; N],
+    ) -> Result<[f64; N], SimulateError> {
+        debug_assert!(LISTS.contains(&name), "classes lay it over each other");
+        let found = match self.said(name) {
+            [Some(own), Some(class)] => self.read(name, &laid(own, class))?,
+            [own, class] => own.or(class).map_or(Ok(vec![]), |text| self.read(name, text))?,
+        };
+        let Some(first) = all.get_mut(..found.len()) else {
+            return Err(self.wrong(format!("at most {N} numbers as `{name}`"), found.len()));
+        };
+        first.copy_from_slice(&found);
+        Ok(all)
     }
 
     /// Exactly so many of them.

@@ -342,14 +342,12 @@ fn path(compiler: &Compiler, file: &str) -> String {
     }
 }
 
-/// MuJoCo's coefficient of rolling friction where none is given, m.
-const ROLLING: f64 = 1e-4;
+/// MuJoCo's coefficients of friction where none are given: of sliding, and of turning and rolling, m.
+const FRICTION: [f64; 3] = [1.0, 5e-3, 1e-4];
 
 fn touch(item: &Item) -> Result<Touch, SimulateError> {
     let bits = |name: &str| item.whole(name, 1).map(|x| x as u32);
-    let given = item.numbers("friction")?.unwrap_or_default();
-    let friction = given.first().copied().unwrap_or(1.0);
-    let rolling = given.get(2).copied().unwrap_or(ROLLING);
+    let [friction, _, rolling] = item.list("friction", FRICTION)?;
     if rolling < 0.0 {
         return Err(item.wrong("a third `friction` of at least 0", rolling));
     }
@@ -373,8 +371,7 @@ fn primitive(
     touches: bool,
     own: &mut Frame,
 ) -> Result<(Solid, Value), SimulateError> {
-    let mut size = item.numbers("size")?.unwrap_or_default();
-    size.resize(3, 0.0);
+    let mut size = item.list("size", [0.0; 3])?;
     if let Some([a, b, c, d, e, f]) = item.some::<6>("fromto")? {
         let along = sub([a, b, c], [d, e, f]);
         let length = norm(along);
@@ -384,8 +381,8 @@ fn primitive(
         let middle = [0.5 * (a + d), 0.5 * (b + e), 0.5 * (c + f)];
         *own = Frame { x: middle, q: from_third(scale(1.0 / length, along)) };
         size = match kind {
-            "box" | "ellipsoid" => vec![size[0], size[0], 0.5 * length],
-            _ => vec![size[0], 0.5 * length, 0.0],
+            "box" | "ellipsoid" => [size[0], size[0], 0.5 * length],
+            _ => [size[0], 0.5 * length, 0.0],
         };
     }
     let needed = match kind {
@@ -398,7 +395,7 @@ fn primitive(
         return Err(item.wrong(format!("{needed} positive numbers as `size`"), bad));
     }
     let (radius, half_length) = (size[0], size[1]);
-    let half = [size[0], size[1], size[2]];
+    let half = size;
     let (shape, value) = match kind {
         "sphere" => (Shape::Sphere { radius }, json!({"kind": kind, "radius": radius})),
         "box" => (Shape::Box { half }, json!({"kind": kind, "half": half})),

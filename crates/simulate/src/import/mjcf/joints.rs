@@ -97,7 +97,7 @@ pub(super) fn read(
     let actuators = root.named("actuator").flat_map(|a| &a.children);
     for (k, element) in actuators.enumerate() {
         let control = controls.get(k).copied().unwrap_or(0.0);
-        rest.actuator(&defaults.item(element, MAIN)?, control)?;
+        rest.actuator(&defaults.item(element, MAIN)?, defaults, control)?;
     }
     let Rest { out, said, .. } = rest;
     tree.said.extend(said);
@@ -182,14 +182,15 @@ fn drive(
         }
         None => Value::Null,
     };
-    for name in ["stiffness", "damping"] {
+    let mut linear = |name: &str| {
         // The first of several is the constant one.
-        if item.numbers(name)?.is_some_and(|x| x.iter().skip(1).any(|x| *x != 0.0)) {
+        let [first, rest @ ..] = item.list(name, [0.0; 3])?;
+        if rest != [0.0; 2] {
             said.push(format!("{}: of `{name}` the linear part is taken", item.key()));
         }
-    }
-    let (stiffness, damping) =
-        (item.first("stiffness")?.unwrap_or(0.0), item.first("damping")?.unwrap_or(0.0));
+        Ok::<_, SimulateError>(first)
+    };
+    let (stiffness, damping) = (linear("stiffness")?, linear("damping")?);
     let rest = unit * item.real("springref", 0.0)? - start;
     let spring = match (stiffness, damping) {
         (0.0, 0.0) => Value::Null,
@@ -280,13 +281,21 @@ impl Rest<'_, '_> {
             }
         };
         let at = one.at.point(anchor);
-        // What meets at the reference may be apart in a keyframe.
-        let met = two.at.then(&two.at_reference.back()).point(one.at_reference.point(anchor));
-        let gap = norm(sub(at, met));
-        if gap > 1e-6 {
+        // What meets at the reference may be apart in a keyframe: where the one would be that the other holds.
+        let held = two.at.then(&two.at_reference.back()).then(&one.at_reference);
+        let gap = norm(sub(at, held.point(anchor)));
+        let [w, x, y, z] = held.back().q.after(one.at.q).0;
+        let turn = match kind {
+            "fixed" => 2.0 * norm([x, y, z]).atan2(w.abs()),
+            _ => 0.0,
+        };
+        let open = [(gap, "m"), (turn, "rad")].into_iter().filter(|(by, _)| *by > 1e-6);
+        let open: Vec<_> = open.map(|(by, unit)| format!("{by:.1e} {unit}")).collect();
+        if !open.is_empty() {
             self.said.push(format!(
-                "{}: open by {gap:.1e} m where the motion begins, and kept as it stands",
-                item.key()
+                "{}: open by {} where the motion begins, and kept as it stands",
+                item.key(),
+                open.join(" and ")
             ));
         }
         let name = item.element.attributes.get("name").cloned();
@@ -309,8 +318,7 @@ impl Rest<'_, '_> {
 
     /// `joint`: a coordinate that follows another, or stays.
     fn joints(&mut self, item: &Item, compiler: &Compiler) -> Result<(), SimulateError> {
-        let mut poly = item.numbers("polycoef")?.unwrap_or(vec![0.0, 1.0]);
-        poly.resize(5, 0.0);
+        let poly = item.list("polycoef", [0.0, 1.0, 0.0, 0.0, 0.0])?;
         let of = |name: &str, coordinates: &[Coordinate]| -> Result<usize, SimulateError> {
             let text = item.text(name).unwrap_or_default();
             let found = coordinates.iter().position(|c| c.name == text);
@@ -361,7 +369,12 @@ impl Rest<'_, '_> {
         Ok(())
     }
 
-    fn actuator(&mut self, item: &Item, control: f64) -> Result<(), SimulateError> {
+    fn actuator(
+        &mut self,
+        item: &Item,
+        defaults: &Defaults,
+        control: f64,
+    ) -> Result<(), SimulateError> {
         let kind = item.element.tag.as_str();
         if !matches!(kind, "position" | "velocity") {
             self.said.push(format!(
@@ -376,32 +389,27 @@ impl Rest<'_, '_> {
             self.said.push(format!("{}: left out: no hinge or slide of its own", item.key()));
             return Ok(());
         };
-        for name in ["dampratio", "timeconst", "inheritrange"] {
-            if item.first(name)?.is_some_and(|x| x != 0.0) {
-                self.said.push(left_out(item, name));
-            }
-        }
+        let servo = defaults.servo(item.element)?;
+        self.said.extend(servo.left_out().map(|what| format!("{}: {what}", item.key())));
         let range = item.some::<2>("ctrlrange")?;
         let limited = item.flag("ctrllimited", range.is_some())?;
         let control = match range.filter(|_| limited) {
             Some([lower, upper]) if lower <= upper => control.clamp(lower, upper),
             _ => control,
         };
-        let gear = item.first("gear")?.unwrap_or(1.0);
+        let [gear, ..] = item.list("gear", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])?;
         let mut motor = match kind {
-            "position" => {
-                let (kp, kv) = (item.first("kp")?.unwrap_or(1.0), item.first("kv")?.unwrap_or(0.0));
-                json!({
-                    "position": control / gear - c.start,
-                    "stiffness": gear * gear * kp, "damping": gear * gear * kv,
-                })
-            }
+            "position" => json!({
+                "position": control / gear - c.start,
+                "stiffness": gear * gear * servo.gain,
+                // A positive one is a ratio, which is left out.
+                "damping": gear * gear * servo.bias[2].min(0.0).abs(),
+            }),
             _ => {
                 if control != 0.0 {
                     self.said.push(format!("{}: its control is taken for 0", item.key()));
                 }
-                let kv = item.first("kv")?.unwrap_or(1.0);
-                json!({"position": -c.start, "damping": gear * gear * kv})
+                json!({"position": -c.start, "damping": gear * gear * servo.gain})
             }
         };
         if gear == 0.0 {

@@ -12,7 +12,9 @@ mod document;
 mod geoms;
 mod joints;
 mod model;
+mod servo;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use nonsmooth_scenes::MassProperties;
@@ -21,10 +23,10 @@ use serde_json::{Value, json};
 
 use self::compiler::Compiler;
 use self::contacts::Contacts;
-use self::document::{Defaults, Element, MAIN};
+use self::document::{Defaults, Element, Item, MAIN};
 use self::geoms::Assets;
 use self::joints::Joints;
-use self::model::Tree;
+use self::model::{Tree, quaternion};
 use super::{Frame, Imported, entries, text as text_of};
 use crate::SimulateError;
 
@@ -102,23 +104,53 @@ fn keyframe(
     defaults: &Defaults,
     tree: &mut Tree,
 ) -> Result<Vec<f64>, SimulateError> {
-    let keys = root.named("keyframe").flat_map(|k| k.named("key"));
-    let Some(key) = keys.into_iter().find(|key| key.attributes.contains_key("qpos")) else {
-        tree.stand(None)?;
+    const COORDINATES: [&str; 3] = ["qpos", "mpos", "mquat"];
+    let mut keys = root.named("keyframe").flat_map(|k| k.named("key"));
+    let placed = |key: &&Element| COORDINATES.iter().any(|c| key.attributes.contains_key(*c));
+    let Some(key) = keys.find(placed) else {
+        tree.stand(None, &BTreeMap::new())?;
         return Ok(vec![]);
     };
     let item = defaults.item(key, MAIN)?;
-    let q = item.numbers("qpos")?.unwrap_or_default();
+    let led = led(&item, tree)?;
+    let q = item.numbers("qpos")?;
     let expected = tree.coordinates();
-    if q.len() != expected {
+    if let Some(q) = q.as_ref().filter(|q| q.len() != expected) {
         return Err(item.wrong(format!("{expected} numbers as `qpos`"), q.len()));
     }
-    tree.stand(Some(&q))?;
+    tree.stand(q.as_deref(), &led)?;
     tree.said.push(format!("{}: the motion begins here", item.key()));
     if item.numbers("qvel")?.is_some_and(|v| v.iter().any(|x| *x != 0.0)) {
         tree.said.push(format!("{}: `qvel` is left out: all is at rest at first", item.key()));
     }
     Ok(item.numbers("ctrl")?.unwrap_or_default())
+}
+
+/// Where a keyframe puts the bodies that are led from outside (`mocap`).
+fn led(key: &Item, tree: &Tree) -> Result<BTreeMap<usize, Frame>, SimulateError> {
+    let mut bodies = vec![];
+    for (k, body) in tree.bodies.iter().enumerate().skip(1) {
+        if body.item.flag("mocap", false)? {
+            bodies.push(k);
+        }
+    }
+    let mut out: BTreeMap<usize, Frame> =
+        bodies.iter().map(|&k| (k, tree.bodies[k].place)).collect();
+    for (name, size) in [("mpos", 3), ("mquat", 4)] {
+        let Some(found) = key.numbers(name)? else { continue };
+        let expected = size * bodies.len();
+        if found.len() != expected {
+            return Err(key.wrong(format!("{expected} numbers as `{name}`"), found.len()));
+        }
+        for (frame, own) in out.values_mut().zip(found.chunks(size)) {
+            match *own {
+                [w, x, y, z] => frame.q = quaternion(key, [w, x, y, z])?,
+                [x, y, z] => frame.x = [x, y, z],
+                _ => unreachable!("chunks of 3 or 4"),
+            }
+        }
+    }
+    Ok(out)
 }
 
 /// Whether parts with a mass of what moves with body k have several `gravcomp`.

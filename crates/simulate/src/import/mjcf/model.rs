@@ -18,11 +18,13 @@ pub(super) struct Body<'a> {
     pub item: Item<'a>,
     pub parent: usize,
     /// In the frame of its parent.
-    place: Frame,
+    pub place: Frame,
     pub joints: Vec<Joint<'a>>,
     pub geoms: Vec<Geom<'a>>,
     /// In its own frame, of `inertial` or its geoms.
     pub masses: Vec<MassProperties>,
+    /// What `inertial` says.
+    stated: Option<MassProperties>,
     /// In the frame of the world at the beginning, and where all joints are at their reference.
     pub at: Frame,
     pub at_reference: Frame,
@@ -115,6 +117,8 @@ struct Place {
     /// Of a `frame` in the body.
     frame: Frame,
     class: String,
+    /// Whether geoms have a mass.
+    heavy: bool,
 }
 
 impl<'a> Tree<'a> {
@@ -137,6 +141,7 @@ impl<'a> Tree<'a> {
             joints: vec![],
             geoms: vec![],
             masses: vec![],
+            stated: None,
             at: Frame::HERE,
             at_reference: Frame::HERE,
         };
@@ -148,7 +153,8 @@ impl<'a> Tree<'a> {
         };
         let reader = Reader { defaults, compiler, assets };
         for element in std::iter::once(first).chain(worlds) {
-            let place = Place { body: 0, frame: Frame::HERE, class: MAIN.into() };
+            let heavy = compiler.from_geoms.unwrap_or(true);
+            let place = Place { body: 0, frame: Frame::HERE, class: MAIN.into(), heavy };
             out.inner(&reader, element, &place)?;
         }
         Ok(out)
@@ -183,23 +189,19 @@ impl<'a> Tree<'a> {
                     self.inner(reader, child, &inner)?;
                 }
                 "geom" => {
-                    // Masses of geoms count where there is no inertial, or always.
-                    let with_mass = match reader.compiler.from_geoms {
-                        Some(always) => always,
-                        None => !inertial(&self.bodies[place.body]),
-                    };
-                    let geom = reader.assets.geom(item, &place.frame, with_mass, &mut self.said)?;
+                    let said = &mut self.said;
+                    let geom = reader.assets.geom(item, &place.frame, place.heavy, said)?;
                     let body = &mut self.bodies[place.body];
                     body.masses.extend(geom.mass);
                     body.geoms.push(geom);
                 }
                 "joint" | "freejoint" => self.joint(reader, item, place)?,
-                "inertial" if reader.compiler.from_geoms != Some(true) => {
-                    let own = self::own_mass(&item, reader.compiler)?;
-                    self.bodies[place.body].masses.push(own);
+                "inertial" => {
+                    let own = place.frame.mass(&own_mass(&item, reader.compiler)?);
+                    self.bodies[place.body].stated = Some(own);
                 }
                 // What has no mass and touches nothing.
-                "inertial" | "site" | "camera" | "light" | "plugin" => {}
+                "site" | "camera" | "light" | "plugin" => {}
                 tag => {
                     let expected =
                         "body, frame, inertial, joint, freejoint, geom, site, camera or light";
@@ -221,7 +223,9 @@ impl<'a> Tree<'a> {
         let name = item.element.attributes.get("name");
         let name = self.fresh(name.cloned().unwrap_or_else(|| format!("body {number}")));
         let class = item.element.attributes.get("childclass").unwrap_or(&place.class);
-        let own = Place { body: number, frame: Frame::HERE, class: class.clone() };
+        // Masses of geoms count where there is no inertial, or always.
+        let heavy = reader.compiler.from_geoms.unwrap_or_else(|| !inertial(item.element));
+        let own = Place { body: number, frame: Frame::HERE, class: class.clone(), heavy };
         self.bodies.push(Body {
             name,
             item,
@@ -230,10 +234,17 @@ impl<'a> Tree<'a> {
             joints: vec![],
             geoms: vec![],
             masses: vec![],
+            stated: None,
             at: Frame::HERE,
             at_reference: Frame::HERE,
         });
-        self.inner(reader, item.element, &own)
+        self.inner(reader, item.element, &own)?;
+        // Where the geoms have none, it is that of the inertial after all.
+        let body = &mut self.bodies[number];
+        if body.masses.is_empty() {
+            body.masses.extend(body.stated.take());
+        }
+        Ok(())
     }
 
     fn joint(
@@ -295,8 +306,12 @@ impl<'a> Tree<'a> {
         self.said.extend(names.map(|name| left_out(item, name)));
     }
 
-    /// Puts all bodies where the coordinates `q` say, or else where their joints are at their reference.
-    pub fn stand(&mut self, q: Option<&[f64]>) -> Result<(), SimulateError> {
+    /// Puts all bodies where the coordinates `q` say, or else where their joints are at their reference; those that are `led` where they are led.
+    pub fn stand(
+        &mut self,
+        q: Option<&[f64]>,
+        led: &BTreeMap<usize, Frame>,
+    ) -> Result<(), SimulateError> {
         for k in 1..self.bodies.len() {
             let parent = self.bodies[k].parent;
             let above = self.bodies[parent].at_reference;
@@ -305,7 +320,8 @@ impl<'a> Tree<'a> {
         let mut next = 0;
         for k in 1..self.bodies.len() {
             let parent = self.bodies[k].parent;
-            let mut at = self.bodies[parent].at.then(&self.bodies[k].place);
+            let beside = || self.bodies[parent].at.then(&self.bodies[k].place);
+            let mut at = led.get(&k).copied().unwrap_or_else(beside);
             for joint in &mut self.bodies[k].joints {
                 let own = q.map(|q| &q[next..next + joint.kind.count()]);
                 next += joint.kind.count();
@@ -314,10 +330,10 @@ impl<'a> Tree<'a> {
                 let Some(own) = own else { continue };
                 let turn = match *own {
                     [x, y, z, a, b, c, d] => {
-                        at = Frame { x: [x, y, z], q: quaternion(joint, [a, b, c, d])? };
+                        at = Frame { x: [x, y, z], q: quaternion(&joint.item, [a, b, c, d])? };
                         continue;
                     }
-                    [a, b, c, d] => quaternion(joint, [a, b, c, d])?,
+                    [a, b, c, d] => quaternion(&joint.item, [a, b, c, d])?,
                     [s] => {
                         joint.start = s;
                         let by = s - joint.reference;
@@ -368,14 +384,15 @@ struct Reader<'a, 'b> {
 }
 
 /// Whether a body states its mass.
-fn inertial(body: &Body) -> bool {
-    body.item.element.named("inertial").next().is_some()
+fn inertial(element: &Element) -> bool {
+    element.named("inertial").next().is_some() || element.named("frame").any(inertial)
 }
 
-fn quaternion(joint: &Joint, q: [f64; 4]) -> Result<Rotation, SimulateError> {
+/// A quaternion of a keyframe, for what an item says.
+pub(super) fn quaternion(item: &Item, q: [f64; 4]) -> Result<Rotation, SimulateError> {
     match q.iter().any(|x| *x != 0.0) {
         true => Ok(unit(Rotation(q))),
-        false => Err(joint.item.wrong("a quaternion in the keyframe", "zero")),
+        false => Err(item.wrong("a quaternion in the keyframe", "zero")),
     }
 }
 
