@@ -14,14 +14,15 @@ pub const FEW: usize = 20;
 /// Decimals that a report prints of a number.
 const DIGITS: usize = 6;
 
-/// Prints a solution under a label; where it has more than [`FEW`] rows and is not asked for, how to have it.
-pub fn text(text: &mut String, label: &str, content: &ProblemFile, asked: bool) {
+/// Prints a solution under a label; where it has more than [`FEW`] rows and is not asked for, how to have it, unless it is `kept` in a file.
+pub fn text(text: &mut String, label: &str, content: &ProblemFile, asked: bool, kept: bool) {
     let Some(stored) = &content.solution else { return };
     let Ok(table) = Table::new(&content.problem, stored, &content.info.names) else { return };
     let rows = table.len();
     if rows > FEW && !asked {
         let what = count(rows, table.columns[0].0);
-        return row(text, label, format!("of {what}: --solution prints it, --out FILE keeps it"));
+        let keeps = if kept { "" } else { ", --out FILE keeps it" };
+        return row(text, label, format!("of {what}: --solution prints it{keeps}"));
     }
     for (k, line) in lines(&table).iter().enumerate() {
         row(text, if k == 0 { label } else { "" }, line);

@@ -138,6 +138,7 @@ pub type Solved = Answer<AnyProblem>;
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
+    warm_start_is_meant(args)?;
     let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
     let mut limits = limits(args.tol, args.max_iter, args.time_limit)?;
     limits.memory_limit = args.memory_limit;
@@ -211,6 +212,26 @@ fn same_format(path: &Path, asked: &About, own: &About) -> Result<(), String> {
     }
 }
 
+/// Refuses a bare `--warm-start` before the name of a file among several: with `=` that would be the point to start from, without it is one more problem.
+fn warm_start_is_meant(args: &Args) -> Result<(), String> {
+    if args.warm_start != Some(None) || args.files.len() < 2 {
+        return Ok(());
+    }
+    let mut words = std::env::args_os().skip_while(|word| word != WARM_START).skip(1);
+    match words.next().map(PathBuf::from).filter(|word| word.is_file()) {
+        Some(file) => {
+            let file = file.display();
+            Err(format!(
+                "{WARM_START} {file}: expected {WARM_START}=FILE, or {WARM_START} after the files, each of which then starts from its own guess, found a file after a blank (did you mean {WARM_START}={file}?)"
+            ))
+        }
+        None => Ok(()),
+    }
+}
+
+/// The option that says where to start.
+const WARM_START: &str = "--warm-start";
+
 /// The point to start from that a file proposes itself, or that another one, or that of the same name in a directory, holds for its problem.
 fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<StoredPoint, String> {
     let Some(from) = from else {
@@ -222,7 +243,9 @@ fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<Stor
         };
         let file = file.display();
         return point.cloned().ok_or_else(|| {
-            format!("{file}: {place}: expected a point for --warm-start, found none")
+            format!(
+                "{file}: {place}: expected a point for --warm-start, found none; --warm-start=FILE takes that of another file"
+            )
         });
     };
     let path = other_file(from, file);
@@ -499,9 +522,13 @@ fn text(file: &Path, content: &ProblemFile, plan: &Plan, solved: &Solved, asked:
     report::uniqueness_text(&mut text, content, &solved.point, verdict);
     // A point that is none is shown to those who ask for it.
     if is_solved {
-        answer::text(&mut text, "solution", content, asked.solution);
+        answer::text(&mut text, "solution", content, asked.solution, asked.out.is_some());
     } else if asked.solution {
-        answer::text(&mut text, "best point", content, true);
+        answer::text(&mut text, "best point", content, true, asked.out.is_some());
+    }
+    if asked.certificate.is_some() && certificate(status).is_none() {
+        let why = if is_solved { "there is a solution" } else { "none was found" };
+        row(&mut text, "certificate", format!("{why}: no file is written"));
     }
     if asked.trace.is_some() && solved.trace == Trace::None {
         row(

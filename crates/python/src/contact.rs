@@ -59,11 +59,10 @@ pub fn made(parts: &Bound<'_, PyDict>, dimension: Option<usize>) -> PyResult<Any
             false => stated::<RollingGlobal>(parts),
         };
     }
-    let free = given.get(if is_local { "q" } else { "w" })?;
-    let (size, rows) = match &free {
-        Some(free) => by_contact(if is_local { "q" } else { "w" }, free)
-            .map(|(all, columns)| (all.len(), columns))?,
-        None => (0, None),
+    let place = if is_local { "q" } else { "w" };
+    let (size, rows) = match given.get(place)? {
+        Some(free) => by_contact(place, &free).map(|(all, columns)| (Some(all.len()), columns))?,
+        None => (None, None),
     };
     let contacts = match given.get("mu")? {
         Some(mu) => match numbers::scalar_or_vector("mu", &mu)? {
@@ -72,19 +71,23 @@ pub fn made(parts: &Bound<'_, PyDict>, dimension: Option<usize>) -> PyResult<Any
         },
         None => None,
     };
-    let by_size = contacts.filter(|&n| n > 0).map(|n| size / n);
-    let d = dimension.or(rows).or(by_size).unwrap_or(USUAL);
-    match (is_local, d) {
+    let by_size = contacts.filter(|&n| n > 0).and_then(|n| Some(size? / n));
+    let known = dimension.or(rows).or(by_size);
+    if let (None, Some(n)) = (known, size)
+        && !n.is_multiple_of(USUAL)
+        && n.is_multiple_of(2)
+    {
+        let what = "3 components for each contact, or dimension=2 for 2 of them";
+        return Err(expected(place, what, format!("{n} components")));
+    }
+    match (is_local, known.unwrap_or(USUAL)) {
         (true, 2) => stated::<FrictionLocal<2>>(parts),
         (true, 3) => stated::<FrictionLocal<3>>(parts),
         (false, 2) => stated::<FrictionGlobal<2>>(parts),
         (false, 3) => stated::<FrictionGlobal<3>>(parts),
-        _ => {
-            let place = if is_local { "q" } else { "w" };
-            Err(expected(place, "2 or 3 components for each contact of mu", {
-                format!("{size} components of {} contacts", contacts.unwrap_or(0))
-            }))
-        }
+        _ => Err(expected(place, "2 or 3 components for each contact of mu", {
+            format!("{} components of {} contacts", size.unwrap_or(0), contacts.unwrap_or(0))
+        })),
     }
 }
 
@@ -208,6 +211,14 @@ fn put_bounds(given: &mut Given<'_, '_>, rows: usize, into: &mut Bounds) -> PyRe
     Ok(())
 }
 
+/// Refuses matrices of scalar rows without the vector that goes with them.
+fn without_rows(given: &Given<'_, '_>, vector: &str, letters: &[&str]) -> PyResult<()> {
+    match letters.iter().find(|letter| given.is_given(letter)) {
+        Some(letter) => Err(expected(vector, &format!("this part beside {letter}"), "nothing")),
+        None => Ok(()),
+    }
+}
+
 fn no_rows(given: &Given<'_, '_>, letters: &[&str]) -> PyResult<()> {
     match letters.iter().find(|letter| given.is_given(letter)) {
         Some(letter) => Err(expected(letter, "a problem with scalar rows", "one without any")),
@@ -234,7 +245,8 @@ where
         };
         let rows = match given.get("s")? {
             None => {
-                no_rows(given, &["V", "R", "lower", "upper"])?;
+                without_rows(given, "s", &["V", "R"])?;
+                no_rows(given, &["lower", "upper"])?;
                 None
             }
             Some(s) => {
@@ -311,6 +323,9 @@ where
         let f = given.need_vector("f")?;
         let w = match given.get("w")? {
             Some(w) => of_contacts("w", &w, D)?,
+            None if given.is_given("H") || given.is_given("mu") => {
+                return Err(expected("w", "this part", "nothing"));
+            }
             None => vec![],
         };
         let mu = mu(given, w.len() / D)?;
@@ -320,7 +335,8 @@ where
         };
         let rows = match given.get("b")? {
             None => {
-                no_rows(given, &["G", "lower", "upper"])?;
+                without_rows(given, "b", &["G"])?;
+                no_rows(given, &["lower", "upper"])?;
                 None
             }
             Some(b) => {

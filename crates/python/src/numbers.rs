@@ -87,11 +87,11 @@ pub fn vector(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     }
 }
 
-/// A vector with D entries a contact, or an array with a row for each contact; and D where it shows.
+/// A vector with D entries a contact (a single column is one), or an array with a row for each contact; and D where it shows.
 pub fn by_contact(place: &str, given: &Bound<'_, PyAny>) -> PyResult<(Vec<f64>, Option<usize>)> {
     let array = reals(place, given)?;
     match array.shape() {
-        [_] => Ok((copied(&array)?, None)),
+        [_] | [_, 1] => Ok((copied(&array)?, None)),
         [_, d] => Ok((copied(&array)?, Some(*d))),
         other => {
             let what = "an array of one dimension, or with a row for each contact";

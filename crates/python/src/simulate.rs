@@ -77,7 +77,12 @@ fn built(
     });
     match watcher.fault() {
         Some(fault) => Err(fault),
-        None => made.map_err(mistake),
+        None => made.map_err(|e| match &e {
+            SimulateError::Lawless { a, b, .. } => mistake(format!(
+                "{e}: world.pair(\"{a}\", \"{b}\", mu=…) states it, world.pair(\"default\", mu=…) that of all pairs that are not listed"
+            )),
+            _ => mistake(e),
+        }),
     }
 }
 

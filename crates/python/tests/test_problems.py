@@ -116,6 +116,11 @@ def test_layouts_are_taken():
         np.testing.assert_array_equal(ns.LCP(matrix, q).M, m)
 
 
+def test_a_column_is_a_vector_by_contacts():
+    column = ns.Friction(W=np.eye(3), q=[[-1.0], [2.0], [1.5]], mu=0.5)
+    assert column.contacts == 1 and column.q.tolist() == [-1.0, 2.0, 1.5]
+
+
 def test_contacts_by_rows_and_in_the_plane():
     problem = ns.Friction(W=np.eye(4), q=[[-1.0, 2.0], [-1.0, 0.1]], mu=[0.5, 0.5])
     assert problem.dimension == 2
@@ -159,6 +164,11 @@ def test_complementarity_problems():
     np.testing.assert_allclose((h.x, h.s), ([1, 0], [0, 1]), atol=1e-9)
 
     b = ns.solve(ns.BoxLCP(np.eye(2), [-5.0, 5.0], [-1, -1], [1, 1]))
+    # One bound for all, or none said.
+    once = ns.BoxLCP(np.eye(2), [-5.0, 5.0], -1, 1)
+    assert once.lower.tolist() == [-1, -1] and once.upper.tolist() == [1, 1]
+    unsaid = ns.BoxLCP(np.eye(2), [-5.0, 5.0])
+    assert unsaid.lower.tolist() == [0, 0] and unsaid.upper.tolist() == [np.inf, np.inf]
     np.testing.assert_allclose(b.z, [1, -1])
 
 

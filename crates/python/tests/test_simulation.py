@@ -209,6 +209,29 @@ def test_mistakes_in_worlds_are_one_sentence(change, said):
         ns.Simulation(world)
 
 
+def test_materials_that_may_meet_need_a_law():
+    world = ns.World()
+    world.plane(name="floor")
+    world.material("stone")
+    world.sphere(0.1, density=1, position=[0, 0, 0.1], material="stone", name="ball")
+    said = r"materials `(default|stone)` and `(default|stone)`.*may meet.*world\.pair\(\"default\", mu=…\)"
+    for make in (ns.Simulation, ns.draw):
+        with pytest.raises(ns.Error, match=said):
+            make(world)
+    with pytest.raises(TypeError, match="mu"):
+        world.pair("stone", "default", e=0.5)
+    world.pair("stone", "default", mu=0.5)
+    run = ns.Simulation(world).run(0.01)
+    assert set(run.contacts()["mu"]) == {0.5}
+    # A family brings the law among its own bodies, not one of theirs and others'.
+    wall = ns.World()
+    wall.generate("stack", count=1)
+    assert ns.Simulation(wall).run(1e-3).solved
+    wall.box([0.1] * 3, density=100, position=[0, 0, 5])
+    with pytest.raises(ns.Error, match='world.pair."stack", "default", mu=…|world.pair."default", "stack", mu=…'):
+        ns.Simulation(wall)
+
+
 def test_steps_that_are_none_are_refused():
     simulation = ns.Simulation(ball())
     with pytest.raises(ns.Error, match="every"):
@@ -217,6 +240,8 @@ def test_steps_that_are_none_are_refused():
         ns.Simulation(ball(), h=-1.0).run(1.0)
     with pytest.raises(ns.Error, match="until"):
         simulation.run(float("inf"))
+    with pytest.raises(ns.Error, match=r"until: expected a time of at least 0 s \(it is 0 s\), found -1.0"):
+        simulation.run(-1)
 
 
 @pytest.mark.parametrize("kind", ["fixed", "revolute", "prismatic", "spherical"])
@@ -234,6 +259,7 @@ def test_a_box_rests_on_a_table_that_a_joint_holds(kind):
 
 def test_a_world_keeps_what_was_said():
     velocity, world = np.zeros(3), ns.World(gravity=[0, 0, 0])
+    world.pair("default", mu=0.3)
     for k in range(3):
         velocity[0] = k
         world.sphere(0.1, density=1, position=[0, k, 0], velocity=velocity)
@@ -309,6 +335,7 @@ def test_worlds_in_the_plane_and_elastic_boxes_have_words():
     assert run.solved and run.velocity[-1, 1, 0] == pytest.approx(2 / 3)
     solid = ns.World()
     solid.plane(motion={"kind": "surface", "velocity": [1, 0, 0]})
+    solid.pair("default", mu=0.3)
     solid.elastic([0.1, 0.1, 0.1], [1, 1, 1], 1e6, density=1000, position=[0, 0, 0.1])
     assert ns.Simulation(solid).run(0.01).bodies == ["body0", "elastic0"]
 

@@ -25,6 +25,20 @@ pub enum SimulateError {
         /// What is wrong.
         problem: String,
     },
+    /// Two materials that may meet, of whose contact nothing is said.
+    #[error(
+        "pairs: expected a law between the materials `{a}` and `{b}`, for {first} and {second} may meet, or [pairs_default], found none"
+    )]
+    Lawless {
+        /// The first material.
+        a: String,
+        /// The second one, perhaps the same.
+        b: String,
+        /// A body of the first material, by its name or `bodies[k]`.
+        first: String,
+        /// A body of the second one.
+        second: String,
+    },
     /// Two shapes that may meet and whose contact is not implemented.
     #[error("{a} and {b}: contact between a {first} and a {second} is not supported")]
     Pair {

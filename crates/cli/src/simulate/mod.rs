@@ -124,13 +124,16 @@ pub struct PlayArgs {
 /// How the names of trajectories end.
 const TRAJECTORY: &[&str] = &["h5", "hdf5"];
 
+/// What is wrong with a table `time` without an end.
+const NO_END: &str = "missing field `end`";
+
 /// The end of a family's run, s, where nobody says another.
 const FAMILY_END: f64 = 1.0;
 
 /// A scene from a file or a family; none where the limits in force ended its making.
 fn scene(args: &Args) -> Result<Option<SceneFile>, String> {
     let Some(path) = &args.scene else { return Err("expected a scene, found none".into()) };
-    let changes: Vec<&str> = args.settings.iter().map(String::as_str).collect();
+    let mut changes: Vec<&str> = args.settings.iter().map(String::as_str).collect();
     let name = path.to_string_lossy();
     let is_file = path.extension().is_some() || path.components().count() > 1;
     let mut scene = match SceneEntry::find(&name) {
@@ -147,7 +150,14 @@ fn scene(args: &Args) -> Result<Option<SceneFile>, String> {
         }
         _ => {
             let text = SceneFile::text(path)?;
-            let wrong = |e| format!("{name}: {e}");
+            // --end stands in for an end that the scene does not state; its value comes below.
+            changes.extend(args.end.map(|_| "time.end=0"));
+            let wrong = |e: SimulateError| match &e {
+                SimulateError::Schema { path, problem } if path == "time" && problem == NO_END => {
+                    format!("{name}: {e}; --end T gives it")
+                }
+                _ => format!("{name}: {e}"),
+            };
             let mut scene = SceneFile::parse(&text, &changes).map_err(wrong)?;
             scene.load_meshes(path.parent().unwrap_or(Path::new(""))).map_err(wrong)?;
             scene
@@ -276,6 +286,15 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let mut recorder = Recorder::new(&scene, &simulation, frames);
     if let Some(file) = &args.resume {
         recorder.resume(file, &mut simulation)?;
+        let (end, t) = (scene.time.end, simulation.state().t);
+        // Up to the rounding of the sum that time is.
+        if end < t - 1e-3 * scene.time.h {
+            let place = if args.end.is_some() { "--end" } else { "time.end" };
+            let file = file.display();
+            return Err(format!(
+                "{place}: expected a time of at least {t} s, which --resume {file} has reached, found {end}"
+            ));
+        }
     }
     if let Some(out) = &out {
         let resumed = args.resume.as_ref().is_some_and(|file| files::same(file, out));

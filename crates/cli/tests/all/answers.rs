@@ -49,7 +49,10 @@ fn small_answers_are_printed_and_large_ones_on_demand() {
     assert_eq!(cells[6], "-0.4", "{text}");
     // More than twenty contacts.
     let text = folder.run("solve wall.hdf5").exits(0).stdout;
-    assert!(text.contains("--solution prints it") && !text.contains("r_t1"), "{text}");
+    assert!(text.contains("--solution prints it, --out FILE keeps it"), "{text}");
+    assert!(!text.contains("r_t1"), "{text}");
+    let text = folder.run("solve wall.hdf5 --out kept.hdf5").exits(0).stdout;
+    assert!(text.contains("--solution prints it") && !text.contains("--out"), "{text}");
     let text = folder.run("solve wall.hdf5 --solution").exits(0).stdout;
     assert!(text.lines().count() > 40 && text.contains("velocities v: "), "{text}");
     // As JSON, with all digits.

@@ -171,6 +171,12 @@ fn auto_solves_the_examples_or_proves_that_there_is_no_solution() {
     let line = first(folder.run("solve impossible.toml --json").exits(1));
     assert_eq!(line["status"], "infeasible");
     has_keys(&line, "certificate/proof");
+
+    let text = folder.run("solve rectifier.toml --certificate none.json").exits(0).stdout;
+    assert!(text.contains("certificate there is a solution: no file is written"), "{text}");
+    assert!(!folder.path("none.json").exists());
+    folder.run("solve impossible.toml --certificate one.json").exits(1);
+    assert!(folder.path("one.json").exists());
 }
 
 #[test]

@@ -60,7 +60,11 @@ fn bad_options_of_solve() {
         ("wall.hdf5 --solver cadoux --set memory=99999999999", &["memory", "at most 50"]),
         ("wall.hdf5 --solver proximal/magic", &["wall.hdf5", "proximal/magic", "proximal/nsgs"]),
         ("wall.hdf5 --solver proximal/nsgs --set prox_magic=1", &["prox_magic"]),
-        ("wall.hdf5 --warm-start", &["wall.hdf5", "/guesses/1", "none"]),
+        ("wall.hdf5 --warm-start", &["wall.hdf5", "/guesses/1", "none", "--warm-start=FILE"]),
+        (
+            "--warm-start box.hdf5 wall.hdf5",
+            &["--warm-start box.hdf5", "did you mean --warm-start=box.hdf5?"],
+        ),
         ("wall.hdf5 --warm-start=nowhere.hdf5", &["--warm-start", "nowhere.hdf5"]),
         (
             "wall.hdf5 --warm-start=wall.hdf5",
@@ -176,6 +180,7 @@ fn slips_are_answered_by_what_was_meant() {
     let folder = Folder::with_problems();
     for (command, meant) in [
         ("solve box.hdf5 --solver nsg", "did you mean `nsgs`?"),
+        ("solve box.hdf5 --solver NSGS", "did you mean `nsgs`?"),
         ("solve box.hdf5 --solver newton-ac", "did you mean `newton_ac`?"),
         ("solve box.hdf5 --solver proximal/nsg", "did you mean `proximal/nsgs`?"),
         ("solve box.hdf5 --solver nsgs --set omgea=0.9", "did you mean `omega`?"),

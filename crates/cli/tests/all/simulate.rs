@@ -99,6 +99,27 @@ fn a_run_goes_on_where_it_ended_as_if_it_had_not() {
 
     let other = folder.run("simulate box.toml --resume part.h5 --set bodies[1].density=500");
     other.refused(&["a trajectory of the same scene"]);
+
+    let before = std::fs::read(folder.path("part.h5")).unwrap();
+    for (says, place) in [("--end 0.05", "--end"), ("--set time.end=0.05", "time.end")] {
+        let back = folder.run(&format!("simulate box.toml --resume part.h5 {says}"));
+        back.refused(&[&format!("{place}: expected a time of at least"), "part.h5", "0.05"]);
+    }
+    assert!(before == std::fs::read(folder.path("part.h5")).unwrap());
+    folder.run("simulate box.toml --resume part.h5").exits(0);
+    for command in ["info part.h5", "solve part.h5"] {
+        folder.run(command).refused(&["found a trajectory, which `nonsmooth play` reads"]);
+    }
+}
+
+#[test]
+fn an_end_may_be_said_where_the_scene_states_none() {
+    let folder = folder();
+    std::fs::write(folder.path("open.toml"), BOX.replace(", end = 0.2", "")).unwrap();
+    let run = folder.run("simulate open.toml --end 0.01").exits(0);
+    assert!(run.stdout.contains("every one of 10 steps"), "{}", run.stdout);
+    let says = "open.toml: time: missing field `end`; --end T gives it";
+    folder.run("simulate open.toml").refused(&[says]);
 }
 
 #[test]

@@ -82,8 +82,12 @@ fn stated(root: &Folder) -> Result<Friction, IoError> {
         }
         [] => {
             let others = root.groups();
+            let has = |name: &str| others.iter().any(|group| group == name);
             let found = match others.is_empty() {
                 true => "no group".into(),
+                false if ["frames", "scene", "steps"].into_iter().all(has) => {
+                    "a trajectory, which `nonsmooth play` reads".into()
+                }
                 false => format!("only /{}", others.join(", /")),
             };
             Err(IoError::Root { file: root.file.into(), found: one_line(found) })

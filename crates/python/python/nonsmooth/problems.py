@@ -287,15 +287,26 @@ class HLCP(Problem):
 
 
 class BoxLCP(Problem):
-    """``−(M z + q) ∈ N_[lower, upper](z)``; bounds may be infinite."""
+    """``−(M z + q) ∈ N_[lower, upper](z)``; bounds are one number for all variables or one for each, and may be infinite. They are 0 and ∞ where nothing is said."""
 
     __slots__ = ()
     _kind = "box_lcp"
 
-    def __init__(self, M: Matrix, q: Numbers, lower: Numbers, upper: Numbers) -> None:
-        self._native = _nonsmooth.Problem.stated(
-            self._kind, dict(M=M, q=q, lower=lower, upper=upper)
-        )
+    def __init__(
+        self,
+        M: Matrix,
+        q: Numbers,
+        lower: Optional[Numbers] = None,
+        upper: Optional[Numbers] = None,
+    ) -> None:
+        try:
+            n: Optional[int] = np.size(q)
+        except ValueError:
+            n = None  # What is wrong with q is said where it is read.
+        lower = _all(0.0 if lower is None else lower, n)
+        upper = _all(np.inf if upper is None else upper, n)
+        parts = dict(M=M, q=q, lower=lower, upper=upper)
+        self._native = _nonsmooth.Problem.stated(self._kind, parts)
 
 
 class MCP(Problem):

@@ -81,7 +81,6 @@ class World:
             "version": 1,
             "name": name,
             "time": {"h": 1e-3, "end": 1.0},
-            "pairs_default": {"mu": 0.0, "e": 0.0},
         }
         if dimension != 3:
             self.document["dimension"] = arguments.whole("dimension", dimension)
@@ -181,9 +180,9 @@ class World:
         return name
 
     def pair(
-        self, a: str, b: Optional[str] = None, *, mu: float = 0.0, e: float = 0.0, **table: object
+        self, a: str, b: Optional[str] = None, *, mu: float, e: float = 0.0, **table: object
     ) -> None:
-        """The law of contact of two materials; of ``"default"`` that of all pairs that are not listed."""
+        """The law of contact of two materials; of ``"default"`` alone that of all pairs that are not listed. Two materials that may meet need one; what names no material is of ``"default"``."""
         if a == "default" and b is None:
             self.document["pairs_default"] = {"mu": mu, "e": e, **_own(table)}
         else:
@@ -384,6 +383,8 @@ class Simulation:
         KeyboardInterrupt. Either way the simulation is whole, and goes on from the last step.
         """
         until, every = arguments.real("until", until), arguments.whole("every", every)
+        if until < 0.0:
+            raise arguments.mistake("until", f"a time of at least 0 s (it is {self.t:g} s)", until)
         return Run(self._native.run(until, self.h, every, on_step), self)
 
 

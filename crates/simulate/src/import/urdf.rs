@@ -388,6 +388,13 @@ fn origin<'a>(node: Node<'a, 'a>, key: &str) -> Result<Frame, SimulateError> {
 fn inertial<'a>(node: Node<'a, 'a>, key: &str) -> Result<Option<MassProperties>, SimulateError> {
     let at = origin(node, key)?;
     let mass = element(node, "mass").map(|n| needed(n, "value", key)).transpose()?.unwrap_or(0.0);
+    if mass < 0.0 {
+        return Err(SimulateError::value(
+            format!("{key}.mass.value"),
+            "a mass of at least 0",
+            mass,
+        ));
+    }
     if mass == 0.0 {
         return Ok(None);
     }

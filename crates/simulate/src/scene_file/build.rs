@@ -661,15 +661,13 @@ impl<'a> Builder<'a> {
 
     /// Two of these materials may meet, and nothing is said of them.
     fn lawless(&self, (m, a): (usize, usize), (n, b): (usize, usize)) -> SimulateError {
-        let name = |k: usize| &self.world.materials()[k];
-        let expected = format!(
-            "a law between the materials `{}` and `{}`, for {} and {} may meet, or [pairs_default]",
-            name(m),
-            name(n),
-            self.world.label(a),
-            self.world.label(b)
-        );
-        SimulateError::value("pairs", expected, "none")
+        let name = |k: usize| self.world.materials()[k].clone();
+        SimulateError::Lawless {
+            a: name(m),
+            b: name(n),
+            first: self.world.label(a).to_string(),
+            second: self.world.label(b).to_string(),
+        }
     }
 }
 

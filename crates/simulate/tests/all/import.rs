@@ -134,6 +134,11 @@ fn what_is_no_robot_is_refused_in_one_line() {
             "link `arm`.mass.value: expected finite numbers, found `two`",
         ),
         (
+            "<mass value=\"2\"/>",
+            "<mass value=\"-2\"/>",
+            "link `arm`.mass.value: expected a mass of at least 0, found -2",
+        ),
+        (
             "<box size=\"1 2 1\"/>",
             "<box size=\"1 2\"/>",
             "link `base`.collision.box.size: expected 3 numbers, found 2",

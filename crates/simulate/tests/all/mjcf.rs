@@ -540,6 +540,7 @@ fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
         ("<mujoco>\n<wheel/></mujoco>".to_owned(), "<wheel> (line 2): expected a part of a model"),
         (body("<composite/>"), "<composite> (line 4): expected body, frame, "),
         (body("<geom type='ellipsoid' size='1 1 1'/>"), "<geom> (line 4): expected plane, sphere,"),
+        (body("<geom name='g' type='box' size='1 2'/>"), "<geom> `g` (line 4): expected 3 positive numbers as `size`, found `1 2`"),
         (body("<geom name='g' size='1 x'/>"), "<geom> `g` (line 4): expected finite numbers as `size`, found `1 x`"),
         (body("<geom type='plane' size='1 1 1'/><geom size='1'/>"), "<geom> (line 4): expected a solid of a body that moves"),
         (body("<geom size='1' class='x'/>"), "<geom> (line 4): expected a class of <default>, found `x`"),

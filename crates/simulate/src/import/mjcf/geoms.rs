@@ -391,8 +391,10 @@ fn primitive(
         "capsule" | "cylinder" => 2,
         _ => 3,
     };
-    if let Some(bad) = size[..needed].iter().find(|x| **x <= 0.0) {
-        return Err(item.wrong(format!("{needed} positive numbers as `size`"), bad));
+    if size[..needed].iter().any(|x| *x <= 0.0) {
+        let expected = format!("{needed} positive numbers as `size`");
+        let found = item.text("size").map_or("none".into(), |text| format!("`{text}`"));
+        return Err(item.wrong(expected, found));
     }
     let (radius, half_length) = (size[0], size[1]);
     let half = size;
