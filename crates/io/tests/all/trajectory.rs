@@ -210,7 +210,7 @@ fn other_files_are_told_what_they_are() {
     }
     // And a trajectory is no problem.
     let message = Fclib.parse(Path::new(NAME), &bytes(&run(1))).unwrap_err().to_string();
-    assert!(message.contains("/bodies"), "{message}");
+    assert!(message.contains("found a trajectory, which `nonsmooth play` reads"), "{message}");
 }
 
 #[test]

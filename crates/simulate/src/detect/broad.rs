@@ -26,6 +26,23 @@ impl Aabb {
         (0..3).map(|k| beyond(k) * beyond(k)).sum::<f64>().sqrt()
     }
 
+    /// Whether a ray from x meets it, made larger by `margin`.
+    pub fn is_on(&self, x: Vec3, ray: Vec3, margin: f64) -> bool {
+        let (mut from, mut to) = (0.0, f64::INFINITY);
+        for k in 0..3 {
+            let (low, high) = (self.low[k] - margin - x[k], self.high[k] + margin - x[k]);
+            if ray[k] == 0.0 {
+                if low > 0.0 || high < 0.0 {
+                    return false;
+                }
+            } else {
+                let (a, b) = (low / ray[k], high / ray[k]);
+                (from, to) = (f64::max(from, a.min(b)), f64::min(to, a.max(b)));
+            }
+        }
+        from <= to
+    }
+
     fn extent(&self) -> f64 {
         (0..3).map(|k| self.high[k] - self.low[k]).fold(0.0, f64::max)
     }

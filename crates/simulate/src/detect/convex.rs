@@ -433,6 +433,12 @@ impl<'a> Side<'a> {
         }
     }
 
+    /// Its lowest point where n is up.
+    pub fn lowest(&self, n: Vec3) -> Vec3 {
+        let down = scale(-1.0, n);
+        add(self.support(down), scale(self.radius(), down))
+    }
+
     /// The normals of all flat faces.
     fn normals(&self) -> impl Iterator<Item = Vec3> + '_ {
         let (faces, ends) = match self {

@@ -5,7 +5,7 @@
 //! of its triangle, points outwards from it exactly if it is seen from outside.
 //!
 //! References: BaerentzenAanaes2005.
-//! Cost: a descent in the tree of triangles, O(log n) of a point near the surface; the body's other pairs cost nothing.
+//! Cost: O(log n), a ray through the tree of triangles for a solid that is near none of them, and a descent to the nearest one where that meets something.
 
 use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
@@ -44,7 +44,7 @@ impl Foot {
 }
 
 impl Surface {
-    /// The points where a solid that overlaps the surface, which has nothing that met it, touches nevertheless; `bounds` is the box of the solid, in the world.
+    /// The points where a solid touches that overlaps the surface and that no triangle has met where it is deepest; `bounds` is the box of the solid, in the world.
     pub(super) fn catch(
         &self,
         (pose, other, bounds): (&Pose, &Side, &Aabb),
@@ -53,6 +53,9 @@ impl Surface {
         found: &mut impl FnMut([Feature; 2], Witness),
     ) {
         let middle = pose.local_point(other.middle());
+        if scratch.near.is_empty() && !self.may_hold(middle) {
+            return;
+        }
         let Some(foot) = self.foot(middle) else { return };
         let is_below = foot.is_below(middle);
         if let Side::Rod { local, world, radius, .. } = other
@@ -100,6 +103,30 @@ impl Surface {
             }
         }
         scratch.near = near;
+    }
+
+    /// False where x, in the frame of the body, is not inside: then a ray from there meets nothing. It goes up from below a heightfield, and else to the nearest side of the box about the mesh.
+    fn may_hold(&self, x: Vec3) -> bool {
+        let mut ray = [0.0; 3];
+        if let Some(below) = self.below {
+            ray = scale(-1.0, below);
+        } else {
+            let Aabb { low, high } = self.tree[0].bounds;
+            let ways = (0..3).flat_map(|k| [(x[k] - low[k], k, -1.0), (high[k] - x[k], k, 1.0)]);
+            let Some((_, k, sign)) = ways.min_by(|a, b| a.0.total_cmp(&b.0)) else { return true };
+            ray[k] = sign;
+        }
+        let mut stack = vec![0_u32];
+        while let Some(k) = stack.pop() {
+            let node = &self.tree[k as usize];
+            if node.bounds.is_on(x, ray, SAME * self.size) {
+                if node.count > 0 {
+                    return true;
+                }
+                stack.extend([node.first, node.first + 1]);
+            }
+        }
+        false
     }
 
     /// The point of the surface that is nearest to x, in the frame of the body.

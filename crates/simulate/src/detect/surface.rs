@@ -20,7 +20,7 @@ use crate::detect::clip::Clip;
 use crate::detect::convex::{self, Side};
 use crate::detect::hull::{Edge, Hull, PosedHull};
 use crate::detect::segments::Segment;
-use crate::detect::witness::{Anchor, Feature, Witness};
+use crate::detect::witness::{Anchor, Feature, Place, Witness};
 use crate::rotation::Pose;
 use crate::state::Axis;
 
@@ -351,13 +351,24 @@ impl Surface {
         (clip, scratch): (&mut Clip, &mut Scratch),
         mut found: impl FnMut([Feature; 2], Witness),
     ) {
-        let mut met = false;
+        let mut deepest: Option<Place> = None;
         let note = |features: [Feature; 2], witness: Witness| {
-            met = true;
+            if self.one_sided {
+                let place = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]);
+                if deepest.is_none_or(|d| place.gap < d.gap) {
+                    deepest = Some(place);
+                }
+            }
             found(features, witness);
         };
         self.meet((pose, other, bounds), prediction, (clip, scratch), note);
-        if !met && self.one_sided {
+        // What is deep is met by some triangles at most, not where it is deepest.
+        let is_all = deepest.is_some_and(|place| {
+            let surface = sub(place.point, scale(0.5 * place.gap, place.normal));
+            let lowest = dot(place.normal, sub(other.lowest(place.normal), surface));
+            lowest >= place.gap - SHALLOW * other.size()
+        });
+        if self.one_sided && !is_all {
             self.catch((pose, other, bounds), prediction, (clip, scratch), &mut found);
         }
     }
