@@ -236,9 +236,9 @@ pub fn tolerance(tol: f64) -> Result<f64, String> {
 /// What a tolerance is.
 pub const TOLERANCE: &str = "a positive number of at most 1";
 
-/// Whether it is one. The residual of doing nothing is about 1: beyond, everything would pass.
+/// Whether it is one that solves take.
 pub fn is_tolerance(tol: f64) -> bool {
-    tol > 0.0 && tol <= 1.0
+    Limits { tolerance: tol, ..Limits::default() }.validate().is_ok()
 }
 
 /// Where the results of `files` go: `to` itself for one file, else a file of the same name in the directory

@@ -11,10 +11,10 @@ use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 use crate::detect::broad::Aabb;
 use crate::detect::clip::Clip;
-use crate::detect::convex::{self, Side};
+use crate::detect::convex::Side;
 use crate::detect::segments::Segment;
-use crate::detect::surface::{Scratch, Surface, Thin};
-use crate::detect::witness::{Anchor, Feature, Witness};
+use crate::detect::surface::{NONE, Scratch, Surface, Thin};
+use crate::detect::witness::{Feature, Witness};
 use crate::rotation::Pose;
 
 /// Feet nearer to each other than this share of the surface's size are one.
@@ -29,7 +29,7 @@ struct Foot {
     height: f64,
     /// The normals of the triangles at it, each by its angle.
     outwards: Vec3,
-    /// Within a triangle, or on an edge that has one on one side only.
+    /// Whether it is in the inner of a triangle, and whether at an edge with a triangle on one side only.
     within: bool,
     on_border: bool,
 }
@@ -62,17 +62,7 @@ impl Surface {
             && world.d == [0.0; 3]
         {
             if is_below {
-                let normal = self.normals[foot.triangle as usize];
-                let below = sub(middle, scale(foot.height, normal));
-                let witness = Witness::Face {
-                    on_a: true,
-                    normal,
-                    other: local.p,
-                    foot: below,
-                    radius: *radius,
-                    anchor: Anchor::Other,
-                };
-                found([self.named(foot.triangle, Feature::Face(0)), Feature::Curved(0)], witness);
+                self.ball_on(foot.triangle, false, (local.p, middle, *radius), found);
             }
             return;
         }
@@ -89,18 +79,7 @@ impl Surface {
         for &t in near.iter().filter(|&&t| self.faces[t as usize] == face) {
             self.template(t, pose, &mut scratch.thin);
             let Thin { hull, posed } = &scratch.thin;
-            let mut keep = |[feature, own]: [Feature; 2], witness: Witness| {
-                let feature = self.named(t, feature);
-                if !self.is_flat(feature) {
-                    found([feature, own], witness);
-                }
-            };
-            if let Side::Hull { hull: h, posed: p, pose: q } = other {
-                let (first, second) = ((hull, posed, pose), (*h, *p, *q));
-                clip.on_face(first, second, 0, prediction, keep);
-            } else if let Some(flat) = (Side::Hull { hull, posed, pose }).flat(posed.normals[0]) {
-                convex::on_flat(&flat, true, other, prediction, &mut keep);
-            }
+            self.on_triangle((t, 0), ((hull, posed, pose), other), prediction, clip, &mut *found);
         }
         scratch.near = near;
     }
@@ -156,31 +135,24 @@ impl Surface {
 
     /// Takes triangle t for the nearest one, or adds its normal where it has the same foot.
     fn compare(&self, t: u32, x: Vec3, same: f64, best: &mut Option<Foot>) {
-        let corners = self.triangles[t as usize].map(|v| self.vertices[v as usize]);
         let n = self.normals[t as usize];
-        let height = dot(n, sub(x, corners[0]));
-        let border = |k: usize| self.edges[self.sides[t as usize][k] as usize].0[1] == u32::MAX;
-        let inwards = |k: usize| cross(n, sub(corners[(k + 1) % 3], corners[k]));
-        let (mut at, mut within, mut on_border, mut angle) =
-            (sub(x, scale(height, n)), true, false, 0.0);
-        if (0..3).any(|k| dot(inwards(k), sub(x, corners[k])) < 0.0) {
-            let mut far = f64::INFINITY;
-            for k in 0..3 {
-                let side = Segment::between(corners[k], corners[(k + 1) % 3]);
-                let s = side.nearest(x);
-                let point = side.at(s);
-                if norm(sub(x, point)) >= far {
-                    continue;
-                }
-                (far, at, within) = (norm(sub(x, point)), point, false);
-                // At a corner two sides of the triangle end, of which either may be a border.
-                (on_border, angle) = match s {
-                    0.0 => (border(k) || border((k + 2) % 3), self.angle(t, k)),
-                    1.0 => (border(k) || border((k + 1) % 3), self.angle(t, (k + 1) % 3)),
-                    _ => (border(k), std::f64::consts::PI),
-                };
-            }
-        }
+        let height = self.height(t, x);
+        let border = |k: usize| self.edges[self.sides[t as usize][k] as usize].0[1] == NONE;
+        let within = self.is_over(t, x);
+        let (at, on_border, angle) = if within {
+            (sub(x, scale(height, n)), false, 0.0)
+        } else {
+            let (k, s, _) = self.on_sides(t, x);
+            let [p, q] =
+                [k, (k + 1) % 3].map(|i| self.vertices[self.triangles[t as usize][i] as usize]);
+            // At a corner two sides of the triangle end, of which either may be a border.
+            let (on_border, angle) = match s {
+                0.0 => (border(k) || border((k + 2) % 3), self.angle(t, k)),
+                1.0 => (border(k) || border((k + 1) % 3), self.angle(t, (k + 1) % 3)),
+                _ => (border(k), std::f64::consts::PI),
+            };
+            (Segment::between(p, q).at(s), on_border, angle)
+        };
         let far = norm(sub(x, at));
         let outwards = scale(angle, n);
         match best {

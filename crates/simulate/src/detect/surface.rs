@@ -38,7 +38,7 @@ const SHALLOW: f64 = 0.01;
 const SLOPE: f64 = 0.05;
 /// Triangles in a leaf of the tree.
 const LEAF: usize = 4;
-const NONE: u32 = u32::MAX;
+pub(super) const NONE: u32 = u32::MAX;
 
 /// A surface in the frame of its body.
 #[derive(Debug, Clone)]
@@ -458,21 +458,38 @@ impl Surface {
             let middle = other.middle();
             let behind = dot(posed.normals[0], middle) < posed.offsets[0];
             let face = usize::from(behind && !self.one_sided);
-            let mut keep = |[feature, own]: [Feature; 2], witness: Witness| {
-                let feature = self.named(t, feature);
-                let gap = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).gap;
-                if gap >= deepest && !self.is_flat(feature) {
-                    found([feature, own], witness);
+            let keep = |features: [Feature; 2], witness: Witness| {
+                if witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).gap >= deepest {
+                    found(features, witness);
                 }
             };
-            if let Side::Hull { hull: h, posed: p, pose: q } = other {
-                let (first, second) = ((&*hull, &*posed, pose), (*h, *p, *q));
-                clip.on_face(first, second, face, prediction, keep);
-            } else if let Some(flat) = triangle.flat(posed.normals[face]) {
-                convex::on_flat(&flat, true, other, prediction, &mut keep);
-            }
+            let both = ((&*hull, &*posed, pose), other);
+            self.on_triangle((t, face), both, prediction, clip, keep);
         }
         scratch.near = near;
+    }
+
+    /// Where the other solid is nearer than `prediction` to a side of triangle t, of which `face` is its number, along the normal of that; points of planes are left out.
+    pub(super) fn on_triangle(
+        &self,
+        (t, face): (u32, usize),
+        (triangle, other): ((&Hull, &PosedHull, &Pose), &Side),
+        prediction: f64,
+        clip: &mut Clip,
+        mut found: impl FnMut([Feature; 2], Witness),
+    ) {
+        let mut keep = |[feature, own]: [Feature; 2], witness: Witness| {
+            let feature = self.named(t, feature);
+            if !self.is_flat(feature) {
+                found([feature, own], witness);
+            }
+        };
+        let (hull, posed, pose) = triangle;
+        if let Side::Hull { hull: h, posed: p, pose: q } = other {
+            clip.on_face(triangle, (*h, *p, *q), face, prediction, keep);
+        } else if let Some(flat) = (Side::Hull { hull, posed, pose }).flat(posed.normals[face]) {
+            convex::on_flat(&flat, true, other, prediction, &mut keep);
+        }
     }
 
     /// Makes the polyhedron without thickness that triangle t is.
@@ -498,34 +515,18 @@ impl Surface {
         found: &mut impl FnMut([Feature; 2], Witness),
     ) {
         let corners = self.triangles[t as usize];
-        let [a, b, c] = corners.map(|v| self.vertices[v as usize]);
         let n = self.normals[t as usize];
-        let height = dot(n, sub(at, a));
         let own = Feature::Curved(0);
-        let beyond = |p: Vec3, q: Vec3| dot(cross(sub(q, p), n), sub(at, p)) > 0.0;
-        if ![(a, b), (b, c), (c, a)].iter().any(|&(p, q)| beyond(p, q)) {
+        if self.is_over(t, at) {
+            let height = self.height(t, at);
             let back = height < 0.0 && !self.one_sided;
-            // A ball that is below the ground as a whole is not on it.
-            if height < -radius && self.one_sided {
-                return;
+            // A ball that is below the ground as a whole is met by what it is deepest behind.
+            if height >= -radius || !self.one_sided {
+                self.ball_on(t, back, (centre, at, radius), found);
             }
-            let normal = if back { scale(-1.0, n) } else { n };
-            let foot = sub(at, scale(height, n));
-            let anchor = Anchor::Other;
-            let witness = Witness::Face { on_a: true, normal, other: centre, foot, radius, anchor };
-            let face = Feature::Face(2 * self.faces[t as usize] + u32::from(back));
-            return found([face, own], witness);
+            return;
         }
-        let mut best = (f64::INFINITY, 0, 0.0);
-        for (k, (p, q)) in [(a, b), (b, c), (c, a)].into_iter().enumerate() {
-            let segment = Segment::between(p, q);
-            let x = segment.nearest(at);
-            let far = norm(sub(at, segment.at(x)));
-            if far < best.0 {
-                best = (far, k, x);
-            }
-        }
-        let (far, k, x) = best;
+        let (k, x, far) = self.on_sides(t, at);
         let [p, q] = [k, (k + 1) % 3].map(|i| self.vertices[corners[i] as usize]);
         let (feature, line) = match x {
             0.0 => (Feature::Vertex(corners[k]), Segment::point(p)),
@@ -539,5 +540,51 @@ impl Surface {
             let witness = Witness::Rounds { s: line, s_radius: 0.0, t: ball, t_radius: radius };
             found([feature, own], witness);
         }
+    }
+
+    /// A ball that touches triangle t itself, or its back.
+    pub(super) fn ball_on(
+        &self,
+        t: u32,
+        back: bool,
+        (centre, at, radius): (Vec3, Vec3, f64),
+        found: &mut impl FnMut([Feature; 2], Witness),
+    ) {
+        let n = self.normals[t as usize];
+        let normal = if back { scale(-1.0, n) } else { n };
+        let foot = sub(at, scale(self.height(t, at), n));
+        let anchor = Anchor::Other;
+        let witness = Witness::Face { on_a: true, normal, other: centre, foot, radius, anchor };
+        let face = self.named(t, Feature::Face(u32::from(back)));
+        found([face, Feature::Curved(0)], witness);
+    }
+
+    /// How far x, in the frame of the body, is in front of the plane of triangle t.
+    pub(super) fn height(&self, t: u32, x: Vec3) -> f64 {
+        let first = self.triangles[t as usize][0];
+        dot(self.normals[t as usize], sub(x, self.vertices[first as usize]))
+    }
+
+    /// Whether the foot of x on the plane of triangle t is in the triangle.
+    pub(super) fn is_over(&self, t: u32, x: Vec3) -> bool {
+        let corner = |k: usize| self.vertices[self.triangles[t as usize][k % 3] as usize];
+        let n = self.normals[t as usize];
+        let beyond = |k| dot(cross(sub(corner(k + 1), corner(k)), n), sub(x, corner(k))) > 0.0;
+        !(0..3).any(beyond)
+    }
+
+    /// The point of the sides of triangle t that is nearest to x: the number of the side, where on it the point is, and how far from x.
+    pub(super) fn on_sides(&self, t: u32, x: Vec3) -> (usize, f64, f64) {
+        let corner = |k: usize| self.vertices[self.triangles[t as usize][k % 3] as usize];
+        let mut best = (0, 0.0, f64::INFINITY);
+        for k in 0..3 {
+            let side = Segment::between(corner(k), corner(k + 1));
+            let s = side.nearest(x);
+            let far = norm(sub(x, side.at(s)));
+            if far < best.2 {
+                best = (k, s, far);
+            }
+        }
+        best
     }
 }
