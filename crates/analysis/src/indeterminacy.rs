@@ -15,7 +15,7 @@ const INACCURACY: f64 = 10.0;
 /// How many of the directions in which the impulses of a solution may change the motion feels.
 ///
 /// At a solution an impulse may grow and shrink along these directions A without leaving its law: a contact that sticks inside its cone, in all D; one that
-/// slips, or sticks at the limit of friction, along `r_c` itself; a scalar row between its bounds, in one. What `[H, G] A` maps to zero changes no velocity, so
+/// slips, or sticks at the limit of friction, along `r_c` itself (likewise the moment of rolling friction); a scalar row between its bounds, in one. What `[H, G] A` maps to zero changes no velocity, so
 /// that with `rank < of` the problem has other solutions with the same motion; `of − rank` is the degree of static indeterminacy. With W in place of H the same
 /// holds of `[W, V; Vᵀ, R] A`.
 ///
@@ -30,6 +30,8 @@ pub struct Indeterminacy {
     pub of: usize,
     /// Whether the rank is an upper bound by counting, in place of one of singular values, which holds up to rounding.
     pub counted: bool,
+    /// Whether a contact is at the border of two statuses, or a row at a bound: its impulse may change one way only, along directions that are not among these.
+    pub one_sided: bool,
 }
 
 impl Indeterminacy {
@@ -55,9 +57,9 @@ impl Indeterminacy {
         }
     }
 
-    /// Whether the motion determines the impulses; a rank by counting does not say so.
+    /// Whether the motion determines the impulses; a rank by counting does not say so, and where impulses may change one way only no rank does.
     pub fn is_unique(&self) -> Option<bool> {
-        match (self.rank < self.of, self.counted) {
+        match (self.rank < self.of, self.counted || self.one_sided) {
             (true, _) => Some(false),
             (false, false) => Some(true),
             (false, true) => None,
@@ -71,13 +73,14 @@ fn global<const D: usize, L: Law<D>>(
     statuses: &[ContactStatus],
     relative: f64,
 ) -> Option<Indeterminacy> {
-    let directions = directions::<L, D>(r, statuses);
+    let directions = directions(r, statuses, |c| p.law(c));
     let columns = directions.iter().map(|direction| direction.of(&p.H).collect());
     let rows = p.rows.iter().flat_map(|rows| {
         between(&rows.bounds, lambda).map(|j| entries(rows.G.column(j), 0).collect())
     });
     let all: Vec<Vec<_>> = columns.chain(rows).collect();
-    counted(&all, None, relative)
+    let bounds = p.rows.as_ref().map(|rows| &rows.bounds);
+    counted(&all, None, relative, is_one_sided(statuses, bounds, lambda))
 }
 
 fn local<const D: usize, L: Law<D>>(
@@ -88,7 +91,7 @@ fn local<const D: usize, L: Law<D>>(
     relative: f64,
 ) -> Option<Indeterminacy> {
     let (w, m) = (p.W.to_csc(), p.q.len());
-    let directions = directions::<L, D>(r, statuses);
+    let directions = directions(r, statuses, |c| p.law(c));
     let across = p.rows.as_ref().map(|rows| rows.V.transpose());
     let columns = directions.iter().map(|direction| {
         let below = across.iter().flat_map(|v| direction.of(v));
@@ -99,7 +102,8 @@ fn local<const D: usize, L: Law<D>>(
             .map(|j| entries(rows.V.column(j), 0).chain(entries(rows.R.column(j), m)).collect())
     });
     let all: Vec<Vec<_>> = columns.chain(rows).collect();
-    counted(&all, dofs, relative)
+    let bounds = p.rows.as_ref().map(|rows| &rows.bounds);
+    counted(&all, dofs, relative, is_one_sided(statuses, bounds, lambda))
 }
 
 /// From the columns by their entries; the rank is at most `most`.
@@ -107,6 +111,7 @@ fn counted(
     columns: &[Vec<(usize, f64)>],
     most: Option<usize>,
     relative: f64,
+    one_sided: bool,
 ) -> Option<Indeterminacy> {
     let of = columns.len();
     if of == 0 {
@@ -125,8 +130,8 @@ fn counted(
     let a = Csc::from_triplets(touched.len(), of, triplets.collect::<Vec<_>>().into_iter()).ok()?;
     let bound = most.map_or(touched.len(), |n| n.min(touched.len()));
     match rank_of_units(&a, DENSE, relative) {
-        Some(rank) => Some(Indeterminacy { rank, of, counted: false }),
-        None => (bound < of).then_some(Indeterminacy { rank: bound, of, counted: true }),
+        Some(rank) => Some(Indeterminacy { rank, of, counted: false, one_sided }),
+        None => (bound < of).then_some(Indeterminacy { rank: bound, of, counted: true, one_sided }),
     }
 }
 
@@ -157,13 +162,19 @@ fn entries<'a>(
 fn directions<L: Law<D>, const D: usize>(
     r: &[f64],
     statuses: &[ContactStatus],
+    law: impl Fn(usize) -> L,
 ) -> Vec<Direction<D>> {
     let rows = (D - 1) / L::DISKS;
     let mut all = vec![];
     for (contact, (status, r)) in statuses.iter().zip(r.chunks_exact(D)).enumerate() {
         // Within a disk the impulse may go anywhere; on its boundary it grows with the pressure.
-        let inside = [status.status == Motion::Stick && !status.at_limit, !status.rolls];
-        let is_free = |k: usize| k > 0 && inside[(k - 1) / rows];
+        let law = law(contact);
+        let sticks = status.status == Motion::Stick && !status.at_limit;
+        let inside = [sticks, !status.rolls && !status.at_rolling_limit];
+        let is_free = |k: usize| {
+            let disk = k.checked_sub(1).map(|k| k / rows);
+            disk.is_some_and(|disk| inside[disk] && law.coefficient(disk) > 0.0)
+        };
         let mut along: [f64; D] = std::array::from_fn(|k| if is_free(k) { 0.0 } else { r[k] });
         let size = norm(&along);
         if status.status == Motion::Open || size <= 0.0 {
@@ -175,6 +186,12 @@ fn directions<L: Law<D>, const D: usize>(
         all.extend((0..D).filter(|&k| is_free(k)).map(|k| Direction { contact, along: axis(k) }));
     }
     all
+}
+
+/// Whether a contact may have another status as well, or the impulse of a row is at a bound.
+fn is_one_sided(statuses: &[ContactStatus], bounds: Option<&Bounds>, lambda: &[f64]) -> bool {
+    let at_bound = bounds.is_some_and(|bounds| between(bounds, lambda).count() < lambda.len());
+    at_bound || statuses.iter().any(|status| status.degenerate)
 }
 
 /// The rows whose impulses are strictly between their bounds.
@@ -219,7 +236,9 @@ mod tests {
 
     #[test]
     fn a_weight_on_two_supports_may_be_on_either() {
-        let some = |rank, of| Some(Indeterminacy { rank, of, counted: false });
+        let found_with =
+            |rank, of, one_sided| Some(Indeterminacy { rank, of, counted: false, one_sided });
+        let some = |rank, of| found_with(rank, of, false);
         let (one, r) = beam(1, 0.5);
         assert_eq!(found(&one, &r), some(2, 2));
         let (two, r) = beam(2, 0.5);
@@ -228,9 +247,13 @@ mod tests {
         assert_eq!(indeterminate.is_unique(), Some(false));
         // Another solution with the same motion, and one at the limits of friction, which one line each is left of.
         assert_eq!(found(&two, &[0.7, 0.1, 0.3, -0.1]), some(2, 4));
-        assert_eq!(found(&two, &[0.5, 0.25, 0.5, -0.25]), some(2, 2));
-        // All of it on one support: the other one is open.
-        assert_eq!(found(&two, &[1.0, 0.0, 0.0, 0.0]), some(2, 2));
+        let at_limits = found(&two, &[0.5, 0.25, 0.5, -0.25]);
+        assert_eq!(at_limits, found_with(2, 2, true));
+        // All of it on one support: the other one is open, and may take some.
+        let on_one = found(&two, &[1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(on_one, found_with(2, 2, true));
+        assert_eq!([at_limits, on_one].map(|i| i.unwrap().is_unique()), [None, None]);
+        assert_eq!(found(&one, &[1.0, 0.0]).unwrap().is_unique(), Some(true));
         let (smooth, r) = beam(3, 0.0);
         assert_eq!(found(&smooth, &r), some(1, 3));
         let (empty, _) = beam(2, 0.5);
@@ -290,7 +313,7 @@ mod tests {
         let case = Planted { contacts: 200, dofs: 240, mix, ..Planted::default() };
         let (p, point) = case.global::<3>();
         let statuses = p.judge(&point, 1e-8).unwrap().statuses;
-        let counted = Indeterminacy { rank: 240, of: 600, counted: true };
+        let counted = Indeterminacy { rank: 240, of: 600, counted: true, one_sided: false };
         assert_eq!(global(&p, (&point.r, &[]), &statuses, ACCURACY), Some(counted));
         let (q, point) = case.local::<3>();
         assert_eq!(local(&q, (&point.r, &[]), &statuses, Some(240), ACCURACY), Some(counted));

@@ -172,8 +172,9 @@ const SHORT: u64 = 1 << 20;
 
 /// Reads a file within the limits; the limit if it came first.
 pub fn read_within(file: &Path, limits: &Limits) -> Result<Result<ProblemFile, Limit>, String> {
-    let length = fs::metadata(file).map_or(0, |m| m.len());
-    if length <= SHORT {
+    // A pipe may keep a reader waiting.
+    let short = |m: fs::Metadata| m.is_file() && m.len() <= SHORT;
+    if fs::metadata(file).map_or(!is_stream(file), short) {
         return read(file).map(Ok);
     }
     let path = file.to_path_buf();

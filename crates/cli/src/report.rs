@@ -106,7 +106,7 @@ pub fn uniqueness_text(
     verdict: &AnyVerdict,
 ) {
     let found = indeterminacy(&content.problem, point, content.info.dofs, verdict);
-    if let Some(Indeterminacy { rank, of, counted }) =
+    if let Some(Indeterminacy { rank, of, counted, .. }) =
         found.filter(|i| i.is_unique() == Some(false))
     {
         let how = if counted { "rank at most" } else { "rank" };
@@ -170,6 +170,9 @@ fn failing(measure: &Measure, tolerance: f64) -> (bool, Vec<Failing>) {
 
 /// The first line on a point: the file, what came of it, and what the judge's decision rests on.
 pub fn headline(file: &Path, says: &str, measure: &Measure, tolerance: f64) -> String {
+    if *measure == Measure::unknown() {
+        return format!("{}: {says} (the point was not judged)\n", file.display());
+    }
     let others = match listed(&failing(measure, tolerance).1, |_| String::new()) {
         none if none.is_empty() => none,
         others => format!("; fails {others}"),
@@ -201,9 +204,14 @@ pub fn verdict_text(
         Some(name) => format!("{i} `{name}`"),
         None => i.to_string(),
     };
-    residual_text(text, &verdict.measure, unit);
+    let judged_at_all = verdict.measure != Measure::unknown();
+    if judged_at_all {
+        residual_text(text, &verdict.measure, unit);
+    } else {
+        row(text, "residual", "not judged: the limit had passed");
+    }
     let (relative, others) = failing(&verdict.measure, tolerance);
-    if !others.is_empty() {
+    if judged_at_all && !others.is_empty() {
         let limit = |f: &Failing| {
             let limit = format!("limit {:.1e}", f.limit).replace(".0e", "e");
             match verdict.measure.own_contact.filter(|_| f.what == check::OWN) {

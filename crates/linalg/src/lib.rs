@@ -11,6 +11,7 @@
 //! All of them are made from slices, and from and to matrices of faer, and with the features `nalgebra` and `sprs` of those crates.
 //! [`Passes`]: sweeps of several threads one behind the other, with the bits of one.
 //! [`pieces`]: work over long vectors on several threads, with the bits of one.
+//! [`LargePages`]: an allocator for programs that hold large arrays.
 //! [`budget`]: the time and memory that all of these may use.
 
 mod block_lu;
@@ -27,6 +28,7 @@ mod fill;
 mod groups;
 mod inverse;
 mod matrix;
+mod pages;
 mod passes;
 pub mod pieces;
 mod rank_lu;
@@ -48,6 +50,7 @@ pub use fill::admit_sparse;
 pub use groups::Groups;
 pub use inverse::{Inverse, Refine, factorisations, is_positive_definite, uncounted};
 pub use matrix::{Matrix, Operator};
+pub use pages::LargePages;
 pub use passes::{Parts, Passes};
 pub use rank_lu::RankLu;
 pub use square_cholesky::SquareCholesky;

@@ -76,6 +76,24 @@ pub fn writing<T: Send, const N: usize, const K: usize>(
     })
 }
 
+/// [`each`] of work that writes to two slices of one entry an item: it is given where its piece begins and the entries of both.
+///
+/// Panics where the slices have not the same length.
+pub fn writing_both<T: Send, U: Send>(
+    least: usize,
+    (a, b): (&mut [T], &mut [U]),
+    work: impl Fn(usize, &mut [T], &mut [U]) + Sync,
+) {
+    assert_eq!(a.len(), b.len());
+    let (n, a, b) = (a.len(), Parts::of(a), Parts::of(b));
+    each(n, least, |piece| {
+        // SAFETY: pieces do not overlap.
+        let (a, b) =
+            unsafe { (a.part(piece.start, piece.len()), b.part(piece.start, piece.len())) };
+        work(piece.start, a, b);
+    });
+}
+
 /// Does two things, at the same time where the budget allows several threads.
 pub fn both<A: Send, B>(there: impl FnOnce() -> A + Send, here: impl FnOnce() -> B) -> (A, B) {
     let Some(team) = budget::team() else { return (there(), here()) };
@@ -124,6 +142,11 @@ mod tests {
                     twice.iter_mut().zip(3 * piece.start..).for_each(|(t, i)| *t += 2 * i);
                     let x = &x[piece];
                     [x.iter().sum(), dot(x, x)]
+                });
+                writing_both(100, (&mut seen, &mut twice), |from, seen, twice| {
+                    seen.iter_mut().zip(twice).zip(from..).for_each(|((seen, t), i)| {
+                        *seen -= if *t == 2 * i { 0 } else { 1000 };
+                    });
                 });
                 assert!(seen.iter().all(|seen| *seen == 1));
                 assert!(twice.iter().enumerate().all(|(i, t)| *t == 2 * i));

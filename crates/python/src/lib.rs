@@ -21,6 +21,9 @@ mod wait;
 
 use pyo3::prelude::*;
 
+#[global_allocator]
+static ALLOCATOR: nonsmooth_linalg::LargePages = nonsmooth_linalg::LargePages;
+
 pyo3::create_exception!(
     _nonsmooth,
     Error,

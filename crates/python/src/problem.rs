@@ -402,7 +402,16 @@ pub fn point(problem: &AnyProblem, place: &str, given: &Bound<'_, PyAny>) -> PyR
         Ok(point.into())
     }
     if let Ok(answer) = given.cast::<crate::solve::Answer>() {
-        return Ok(answer.get().answer.point.clone());
+        let answer = answer.get();
+        // Arrays of contacts of another dimension may be as long.
+        if let (AnyProblem::Friction(ours), AnyProblem::Friction(theirs)) =
+            (problem, &answer.file.problem)
+            && ours.kind().dimension() != theirs.kind().dimension()
+        {
+            let what = format!("an answer to a problem {}", ours.kind().name());
+            return Err(expected(place, &what, format!("one to {}", theirs.kind().name())));
+        }
+        return Ok(answer.answer.point.clone());
     }
     fn solution_of<P: Stated>(_: &P) -> &'static [&'static str] {
         P::SOLUTION

@@ -189,20 +189,45 @@ def test_where_a_function_fails_the_judge_looks_in_vain():
 
 @pytest.mark.parametrize("n", [3, 400])
 def test_nothing_is_called_after_what_was_raised(n):
-    calls = failing = 0
+    calls = failing = failed = 0
 
     def F(x):
         nonlocal calls
         calls += 1
-        if failing and calls == 2:
-            raise ZeroDivisionError("by nothing")
         return x**3 + x - 2
 
-    problem = ns.MCP(F, np.zeros(n), jac=lambda x: sp.diags(3 * x**2 + 1).tocsr())
+    def jac(x):
+        nonlocal failed
+        if failing:
+            failed = calls
+            raise ZeroDivisionError("by nothing")
+        return sp.diags(3 * x**2 + 1).tocsr()
+
+    problem = ns.MCP(F, np.zeros(n), jac=jac)
     calls, failing = 0, 1
     with pytest.raises(ZeroDivisionError, match="by nothing"):
         ns.solve(problem)
-    assert calls == 2
+    assert 0 < failed == calls
+
+
+def test_a_step_that_leaves_the_domain_is_shortened():
+    import math
+
+    def F(x):
+        return [4 * math.sqrt(x[0]) - 0.4]
+
+    for jac in [None, lambda x: [[2 / math.sqrt(x[0])]]]:
+        problem = ns.MCP(F, [4.0], lower=-np.inf, jac=jac)
+        for solver in ("auto", "path", "semismooth", "newton_fb"):
+            assert ns.solve(problem, solver).x == pytest.approx([0.01], abs=1e-6)
+    box = ns.VI(F, ns.Box([-1.0], [5.0]), [4.0])
+    assert ns.solve(box, "extragradient").x == pytest.approx([0.01], abs=1e-6)
+
+
+def test_a_function_may_fail_at_probes_for_a_pattern():
+    # int(nan) raises.
+    problem = ns.MCP(lambda x: [x[0] - int(x[1] * 0) - 3, x[1] - 0.5 * x[0]], [0.0, 0.0], lower=-np.inf)
+    assert ns.solve(problem).x == pytest.approx([3.0, 1.5])
 
 
 def test_what_is_raised_in_one_thread_is_raised_there():

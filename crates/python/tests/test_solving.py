@@ -106,6 +106,11 @@ def test_warm_starts(box):
         ns.solve(lcp, warm_start=[1, 2, 3])
     with pytest.raises(ns.Error, match="r: expected 3"):
         ns.solve(box, warm_start=first.r)
+    # As many numbers, of three contacts.
+    rolling = ns.Friction(W=np.eye(15), q=-np.ones(15), mu=0.3, mu_r=0.2)
+    sliding = ns.solve(ns.Friction(W=np.eye(15), q=-np.ones(15), mu=0.3))
+    with pytest.raises(ns.Error, match="an answer to a problem rolling_friction_local_3d, found one to friction_local_3d"):
+        ns.solve(rolling, warm_start=sliding)
 
 
 @pytest.mark.parametrize("contacts", [20, 200])

@@ -114,8 +114,8 @@ pub enum Impact {
     /// Newton's: `u_N⁺ ≥ −e u_N⁻`, Coulomb's law with u_T⁺ (or `u_T⁺ + e_T u_T⁻`). With e > 0 and friction energy may grow. What opens while something hits
     /// it has the largest e of the impacts.
     Newton,
-    /// Frémond's: Coulomb's law with the mean velocity of the step; every contact of an impact dissipates for `½ ≤ θ ≤ 1/(1 + e)`. A contact that stuck in
-    /// the step before has u_T⁺, else what is left of u_T would change its sign for ever.
+    /// Frémond's: the laws of sliding and of rolling friction with the mean velocity of the step; every contact of an impact dissipates for `½ ≤ θ ≤ 1/(1 + e)`. A contact
+    /// that stuck in the step before has u_T⁺, one that did not roll u_R⁺, else what is left of them would change its sign for ever.
     Fremond,
 }
 

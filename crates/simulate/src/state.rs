@@ -125,6 +125,9 @@ pub(crate) struct Remembered {
     /// Whether it took part in the step.
     pub active: bool,
     pub stuck: bool,
+    /// Whether rolling friction held it.
+    #[serde(default)]
+    pub unrolled: bool,
 }
 
 /// The kind of separating axis of two polyhedra.

@@ -293,7 +293,10 @@ impl<P: Registered + Judged<Point: OfAnyPoint>> Solvable for P {
         kept.put(how, session);
         Ok(Answer {
             point,
-            status: outcome.status,
+            status: joined(outcome.status, verdict.solved, || {
+                let all = outcome.iterations >= how.limits.max_iterations;
+                how.limits.reached(begun).or(all.then_some(Limit::Iterations))
+            }),
             verdict,
             iterations: outcome.iterations,
             factorisations: outcome.factorisations,
@@ -332,6 +335,17 @@ fn of_any<P: OfAny>(answer: Answer<P>) -> Answer<AnyProblem> {
     }
 }
 
+/// The status of a solve by the last verdict on its point: what that does not call solved is not, but ended at the limit that is reached, or without more to say.
+fn joined(status: Status, solved: bool, reached: impl FnOnce() -> Option<Limit>) -> Status {
+    match status {
+        Status::Solved if !solved => match reached() {
+            Some(limit) => Status::Limit(limit),
+            None => Status::Stalled("the point that was found fails the last check".into()),
+        },
+        status => status,
+    }
+}
+
 /// The judge's word on the point, with the gauge of the solve where there is one: nothing is factorised twice. Where the limits leave no time for more it is
 /// the measure of the solve alone.
 fn verdict<P>(
@@ -348,7 +362,7 @@ where
     let tolerance = limits.tolerance;
     let alone = || Verdict {
         measure: outcome.measure,
-        solved: outcome.measure.passes(tolerance),
+        solved: outcome.status == Status::Solved && outcome.measure.passes(tolerance),
         counts: P::Counts::default(),
         statuses: vec![],
         velocity: problem.partner(point),

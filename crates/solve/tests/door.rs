@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use nonsmooth_linalg::{Bsr, Dense};
 use nonsmooth_problem::check::Measure;
-use nonsmooth_problem::field::{Differences, Pattern};
+use nonsmooth_problem::field::{Closures, Differences, Pattern};
 use nonsmooth_problem::planted::{Planted, PlantedLcp, PlantedMlcp};
 use nonsmooth_problem::{
     AnyProblem, FrictionGlobal, FrictionLocal, GlobalPoint, Lcp, Mcp, OfAny, Problem,
@@ -199,5 +199,27 @@ fn the_time_limit_holds_for_slow_functions() {
         assert_eq!(answer.status, Status::Limit(Limit::Time), "{name}");
         assert!(spent < limit + 0.35 * slack, "{name} to {limit} s: {spent}");
         assert!(answer.point.z.iter().all(|x| x.is_finite()), "{name}");
+    }
+}
+
+/// At whatever time a limit comes: F is as little zero as before, though its Jacobian says that its terms are large.
+#[test]
+fn a_time_limit_solves_nothing() {
+    let field = Closures::new(Pattern::dense(1), |x, f| f[0] = x[0] - 8.0, |_, j| j[0] = 1e12);
+    let free = f64::INFINITY;
+    let problem = Mcp::new(field.unwrap(), vec![-free], vec![free], vec![1.0]).unwrap();
+    for name in registry::solver_names::<Mcp>() {
+        for limit in [0.0, 1e-5, 1e-3] {
+            let answer = match Solve::new().solver(&*name).time_limit(limit).run(&problem) {
+                Err(e) if e.is_inapplicable() => continue,
+                answer => answer.unwrap(),
+            };
+            assert!(
+                !answer.is_solved() || answer.point.z[0] == 8.0,
+                "{name} to {limit} s: {:?}",
+                answer.point
+            );
+            assert!(!answer.is_solved() || answer.verdict.solved, "{name} to {limit} s");
+        }
     }
 }

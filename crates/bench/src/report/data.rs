@@ -128,8 +128,10 @@ impl<'a> Data<'a> {
         let mut runs = Columns::default();
         for run in &all.runs {
             let problem = names.index(&run.problem);
+            // Runs of one problem may name several, of which views know all.
+            let family = families.index(&run.family);
             if problem == problems.name.len() {
-                problems.family.push(families.index(&run.family));
+                problems.family.push(family);
                 problems.kind.push(kinds.iter().position(|k| *k == run.kind).unwrap_or_default());
                 problems.push(run, all.problems.get(&run.problem));
             }

@@ -635,7 +635,10 @@ fn poor_data_makes_no_errors() {
     foreign.campaign = "there".into();
     let mut waiting = runs(here(), vec![run("a/1", "s", 1e-8, Ending::Solved, 0.0)]);
     waiting.problems.insert("a/2".into(), Problem { name: "a/2".into(), ..Problem::default() });
+    let mut moved = vec![run("a/1", "s", 1e-8, Ending::Solved, 0.0); 2];
+    moved[1].family = "elsewhere".into();
     let cases = [
+        ("two families of one problem", runs(here(), moved)),
         ("one run", runs(here(), vec![run("p", "s", 1e-8, Ending::Solved, 1.0)])),
         ("none solved", runs(here(), vec![run("p", "s", 1e-8, Ending::Hung, 20.0)])),
         ("nothing known", runs(here(), vec![bare(Ending::Crashed)])),

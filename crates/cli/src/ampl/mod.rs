@@ -171,18 +171,13 @@ fn answer(
         let said = pairs.iter().filter(|(_, value)| !value.is_empty());
         said.for_each(|(key, value)| output::print(&format!("{key}={value}\n")));
     }
-    let said = match (Model::read(&file, &options.model), mistake) {
+    let said = match (Model::read_within(&file, call.bounds.as_deref(), &options.model), mistake) {
         (Ok(model), mistake) => {
             let Model { problem, names, echo, remarks, .. } = model;
-            let mut problem = problem;
             let mut said = Said { x: vec![], ..Said::error("", &echo) };
-            let bounded = match &call.bounds {
-                Some(path) => override_bounds(path, &mut problem),
-                None => Ok(()),
-            };
-            match mistake.map_or(bounded, Err) {
-                Err(e) => said.message = format!("Error: {e}"),
-                Ok(()) => {
+            match mistake {
+                Some(e) => said.message = format!("Error: {e}"),
+                None => {
                     let undefined = problem_is_undefined(&problem);
                     said.of(solved(&file, &problem.into(), &options, begun), undefined);
                 }
@@ -310,22 +305,4 @@ fn solved(
 fn problem_is_undefined(problem: &nonsmooth_problem::Mcp) -> bool {
     let x = nonsmooth_problem::Problem::origin(problem).z;
     !problem.F.evaluator().value(&x, &mut vec![0.0; x.len()])
-}
-
-/// Puts bounds from a file of triples `variable lower upper`, variables counted from 0, in place of those of the model.
-fn override_bounds(path: &Path, problem: &mut nonsmooth_problem::Mcp) -> Result<(), String> {
-    let wrong = |found: &str| {
-        let expected = "triples of a variable, a lower and an upper bound";
-        format!("{}: expected {expected}, found {found}", path.display())
-    };
-    let text = std::fs::read_to_string(path).map_err(|e| wrong(&e.to_string()))?;
-    let words: Vec<_> = text.split_whitespace().collect();
-    for triple in words.chunks(3) {
-        let bad = || wrong(&format!("`{}`", triple.join(" ")));
-        let [j, l, u] = triple else { return Err(bad()) };
-        let j: usize = j.parse().ok().filter(|&j| j < problem.dim()).ok_or_else(bad)?;
-        problem.lower[j] = l.parse().map_err(|_| bad())?;
-        problem.upper[j] = u.parse().map_err(|_| bad())?;
-    }
-    problem.validate().map_err(|e| format!("{}: {e}", path.display()))
 }

@@ -373,9 +373,14 @@ pub fn run(args: &Args) -> Result<Exit, String> {
 
 /// The time between two flushes.
 fn pause(seconds: f64) -> Result<Duration, String> {
-    Duration::try_from_secs_f64(seconds).map_err(|_| {
-        format!("--flush: expected a number of seconds of at least 0, found {seconds}")
-    })
+    match Duration::try_from_secs_f64(seconds) {
+        Ok(pause) => Ok(pause),
+        // Beyond the reach of the clock.
+        Err(_) if seconds > 0.0 => Ok(Duration::MAX),
+        Err(_) => {
+            Err(format!("--flush: expected a number of seconds of at least 0, found {seconds}"))
+        }
+    }
 }
 
 /// Sets the flag after so many seconds, however long a step takes.

@@ -195,6 +195,29 @@ fn without_the_flag_the_answer_is_printed() {
 }
 
 #[test]
+fn a_file_of_bounds_is_as_the_bounds_of_the_model() {
+    let place = Place::new(MODEL);
+    let end = |bounds: &str, options: &[&str]| {
+        std::fs::write(place.0.path("bounds"), bounds).unwrap();
+        place.run(&[&["-bbounds", "m", "-AMPL"], options].concat()).exits(0);
+        values(&place.solution())
+    };
+    // x0 belongs to the equation, which bounds do not replace.
+    assert_eq!(end("0 5 inf\n", &[]).1, "objno 0 505");
+    let (x, ended) = end("0 1.5 inf\n", &["sideineq=1"]);
+    assert!(near(&x, &[2.0, 1.0]) && ended == "objno 0 0", "{x:?} {ended}");
+    assert_eq!(end("1 3 2\n", &[]).1, "objno 0 200");
+    assert_eq!(end("1 0 nan\n", &[]).1, "objno 0 501");
+    assert_eq!(end("2 0 1\n", &[]).1, "objno 0 501");
+    // −1 ends at an upper bound: 1e30 is none, but where infinity is beyond.
+    let falling = MODEL.replacen("J1 2\n0 -1\n1 1\n", "J1 2\n0 0\n1 0\n", 1);
+    std::fs::write(place.0.path("m.nl"), falling.replacen("C1\nn1", "C1\nn-1", 1)).unwrap();
+    assert_eq!(end("1 0 1e10\n", &[]).0[1], 1e10);
+    assert_ne!(end("1 0 1e30\n", &[]).1, "objno 0 0");
+    assert_eq!(end("1 0 1e30\n", &["infinity=1e40"]).0[1], 1e30);
+}
+
+#[test]
 fn questions_are_answered_and_mistakes_are_one_line() {
     let place = Place::new(MODEL);
     let version = place.run(&["-v"]).exits(0).stdout;

@@ -74,3 +74,23 @@ fn ctrl_c_returns_the_best_iterate() {
     assert_eq!(checked[0]["residual"], lines[0]["residual"]);
     assert!(!folder.path("best/wall.hdf5").exists());
 }
+
+/// The limit holds while a file is read, also one that nobody ends.
+#[test]
+fn a_pipe_that_nobody_writes_to_does_not_outlast_the_limit() {
+    let folder = Folder::new();
+    let made = Command::new("mkfifo").arg(folder.path("pipe.toml")).status().unwrap();
+    assert!(made.success());
+    for file in ["-", "pipe.toml"] {
+        let arguments = ["solve", file, "--time-limit", "0.2", "--json"];
+        let mut command = folder.command();
+        command.args(arguments).stdin(Stdio::piped());
+        let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        // It stays open until the end.
+        let input = child.stdin.take();
+        let run = Run::from(child.wait_with_output().unwrap()).exits(1);
+        drop(input);
+        let line = run.json().remove(0);
+        assert_eq!(line["status"], "time_limit", "{file}: {line}");
+    }
+}

@@ -83,7 +83,18 @@ impl Model {
     ///
     /// Errors: what the system refuses; whatever is not as the format says, by line or byte; what is no MCP.
     pub fn read(path: &Path, options: &Options) -> Result<Self, Refusal> {
-        Self::with_names(path, &bytes(path)?, options, |echo| Names {
+        Self::read_within(path, None, options)
+    }
+
+    /// As [`read`](Self::read), with bounds from a file of triples `variable lower upper`, variables counted from 0, in place of those of the model.
+    ///
+    /// Errors: likewise, of either file.
+    pub fn read_within(
+        path: &Path,
+        bounds: Option<&Path>,
+        options: &Options,
+    ) -> Result<Self, Refusal> {
+        Self::with_names(path, &bytes(path)?, bounds, options, |echo| Names {
             variables: names(&path.with_extension("col"), echo.variables),
             rows: names(&path.with_extension("row"), echo.rows),
         })
@@ -93,16 +104,24 @@ impl Model {
     ///
     /// Errors: likewise.
     pub fn parse(path: &Path, bytes: &[u8], options: &Options) -> Result<Self, Refusal> {
-        Self::with_names(path, bytes, options, |_| Names::default())
+        Self::with_names(path, bytes, None, options, |_| Names::default())
     }
 
     fn with_names(
         path: &Path,
         bytes: &[u8],
+        bounds: Option<&Path>,
         options: &Options,
         names: impl Fn(&Echo) -> Names,
     ) -> Result<Self, Refusal> {
-        let contents = read::contents(path, bytes, options.infinity)?;
+        let mut contents = read::contents(path, bytes, options.infinity)?;
+        if let Some(bounds) = bounds {
+            // Before rows and variables are paired: which bounds are conditions of their own goes by them.
+            contents.rebound(bounds, options.infinity).map_err(|error| Refusal {
+                error: Box::new(error),
+                answer: Some(Box::new((contents.echo.clone(), pairing::MISSTATED))),
+            })?;
+        }
         let names = names(&contents.echo);
         pairing::model(path, contents, names, options)
     }

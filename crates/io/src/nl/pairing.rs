@@ -83,12 +83,16 @@ pub(super) fn model(
     let at = |mark, what: String| format!("{}, {what}", Input::place(echo.form, mark));
     let row_name = |i: usize| format!("row {i}{}", named(&names.rows, i));
     let variable_name = |j: usize| format!("variable {j}{}", named(&names.variables, j));
+    let bounds_of = |j: usize| match bounds[j].0 {
+        Some(mark) => at(mark, variable_name(j)),
+        None => format!("the file of bounds, {}", variable_name(j)),
+    };
     let n = echo.variables;
 
-    for (j, &(mark, [l, u])) in bounds.iter().enumerate() {
+    for (j, &(_, [l, u])) in bounds.iter().enumerate() {
         if l > u {
             let found = format!("{l:?} and {u:?}");
-            let place = at(mark, variable_name(j));
+            let place = bounds_of(j);
             return Err(refused(BOUNDS_CROSS, place, "bounds that do not cross", found));
         }
     }
@@ -107,7 +111,7 @@ pub(super) fn model(
                     return Err(refused(MISSTATED, place, "a variable of its own", found));
                 }
                 row_of[j] = Some(i);
-                if stated != bounds[j].1.map(f64::is_finite) {
+                if bounds[j].0.is_some() && stated != bounds[j].1.map(f64::is_finite) {
                     let place = at(mark, row_name(i));
                     let name = variable_name(j);
                     remarks.push(format!(
@@ -141,10 +145,10 @@ pub(super) fn model(
     }
     let sided = |j: &usize| bounds[*j].1.iter().any(|b| b.is_finite());
     if let (Some(&j), false) = (unnamed.iter().find(|j| sided(j)), allowed) {
-        let (mark, [l, u]) = bounds[j];
+        let [l, u] = bounds[j].1;
         let found = format!("the bounds {l:?} and {u:?} (sideineq=1 allows them)");
         let expected = "a free variable, as no row is complementary to it";
-        let place = at(mark, variable_name(j));
+        let place = bounds_of(j);
         return Err(refused(SIDE_INEQUALITY, place, expected, found));
     }
 

@@ -8,6 +8,7 @@ use super::expression::Builder;
 use super::header::{Echo, Header, header};
 use super::input::Input;
 use crate::IoError;
+use crate::format::bytes;
 
 /// What a row of the file asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,7 +19,7 @@ pub(super) enum Condition {
     Complements(usize, [bool; 2]),
 }
 
-/// What stands in a file, each row and variable with the mark of its bounds.
+/// What stands in a file, each row and variable with the mark of its bounds, which those of another file do not have.
 #[derive(Debug)]
 pub(super) struct Contents {
     pub(super) title: Option<String>,
@@ -27,7 +28,7 @@ pub(super) struct Contents {
     /// The expression of each row.
     pub(super) rows: Vec<Id>,
     pub(super) conditions: Vec<(usize, Condition)>,
-    pub(super) bounds: Vec<(usize, [f64; 2])>,
+    pub(super) bounds: Vec<(Option<usize>, [f64; 2])>,
     pub(super) start: Vec<f64>,
 }
 
@@ -40,7 +41,7 @@ struct Reader<'a> {
     expressions: Vec<Option<Id>>,
     linear: Vec<Option<Vec<(usize, f64)>>>,
     conditions: Option<Vec<(usize, Condition)>>,
-    bounds: Option<Vec<(usize, [f64; 2])>>,
+    bounds: Option<Vec<(Option<usize>, [f64; 2])>>,
     start: Option<Vec<f64>>,
     /// From where on bounds are infinite.
     infinity: f64,
@@ -70,6 +71,48 @@ pub(super) fn contents(file: &Path, bytes: &[u8], infinity: f64) -> Result<Conte
         reader.segment(letter)?;
     }
     reader.done()
+}
+
+/// Bounds of which those from `infinity` on are infinite. Errors: what is expected, and what is not that.
+fn possible(given: [f64; 2], infinity: f64) -> Result<[f64; 2], (String, f64)> {
+    let [l, u] = given.map(|x| if x.abs() >= infinity { x.signum() * f64::INFINITY } else { x });
+    let impossible = if l == f64::INFINITY { Some(l) } else { None };
+    match impossible.or((u == f64::NEG_INFINITY).then_some(u)) {
+        Some(x) => {
+            Err((format!("a lower bound below {infinity:?}, an upper one above -{infinity:?}"), x))
+        }
+        None => Ok([l, u]),
+    }
+}
+
+impl Contents {
+    /// Puts bounds from a file of triples `variable lower upper`, variables counted from 0, in place of those of the model.
+    ///
+    /// Errors: what the system refuses; what is no such triple.
+    pub(super) fn rebound(&mut self, file: &Path, infinity: f64) -> Result<(), IoError> {
+        let bytes = bytes(file)?;
+        let text = String::from_utf8_lossy(&bytes);
+        let words: Vec<_> = text.split_whitespace().collect();
+        let real = |word: &str| word.parse::<f64>().ok().filter(|x| !x.is_nan());
+        for (k, triple) in words.chunks(3).enumerate() {
+            let place = format!("triple {}", k + 1);
+            let read = match triple {
+                [j, l, u] => j.parse().ok().zip(real(l).zip(real(u))),
+                _ => None,
+            };
+            let known = read.filter(|&(j, _): &(usize, _)| j < self.bounds.len());
+            let Some((j, (l, u))) = known else {
+                let n = self.bounds.len();
+                let expected = format!("a variable below {n}, a lower and an upper bound");
+                let found = format!("`{}`", triple.join(" "));
+                return Err(IoError::data(file, place, expected, found));
+            };
+            let given = possible([l, u], infinity)
+                .map_err(|(expected, found)| IoError::data(file, place, expected, found))?;
+            self.bounds[j] = (None, given);
+        }
+        Ok(())
+    }
 }
 
 impl Reader<'_> {
@@ -229,40 +272,27 @@ impl Reader<'_> {
         Ok((mark, Condition::Complements(j as usize - 1, flags)))
     }
 
-    fn variable(&mut self, j: usize) -> Result<(usize, [f64; 2]), IoError> {
+    fn variable(&mut self, j: usize) -> Result<(Option<usize>, [f64; 2]), IoError> {
         let what = format!("segment b, variable {j}");
         self.input.record(&what, "the bounds of a variable")?;
         let mark = self.input.mark();
         let code = self.input.code(&what)?;
-        Ok((mark, self.interval(code, &what, "a code from 0 to 4")?))
+        Ok((Some(mark), self.interval(code, &what, "a code from 0 to 4")?))
     }
 
     /// The bounds that follow a code.
     fn interval(&mut self, code: i64, what: &str, expected: &str) -> Result<[f64; 2], IoError> {
-        let mut bound = || {
-            let x = self.input.real(what)?;
-            Ok::<_, IoError>(if x.abs() >= self.infinity { x.signum() * f64::INFINITY } else { x })
-        };
-        let (l, u) = match code {
-            0 => (bound()?, bound()?),
-            1 => (f64::NEG_INFINITY, bound()?),
-            2 => (bound()?, f64::INFINITY),
-            3 => (f64::NEG_INFINITY, f64::INFINITY),
-            4 => {
-                let x = bound()?;
-                (x, x)
-            }
+        let mut real = || self.input.real(what);
+        let given = match code {
+            0 => [real()?, real()?],
+            1 => [f64::NEG_INFINITY, real()?],
+            2 => [real()?, f64::INFINITY],
+            3 => [f64::NEG_INFINITY, f64::INFINITY],
+            4 => [real()?; 2],
             other => return Err(self.input.wrong(what, expected, other)),
         };
-        let impossible = if l == f64::INFINITY { Some(l) } else { None };
-        match impossible.or((u == f64::NEG_INFINITY).then_some(u)) {
-            Some(x) => {
-                let expected =
-                    format!("a lower bound below {0:?}, an upper one above -{0:?}", self.infinity);
-                Err(self.input.wrong(what, &expected, x))
-            }
-            None => Ok([l, u]),
-        }
+        possible(given, self.infinity)
+            .map_err(|(expected, found)| self.input.wrong(what, &expected, found))
     }
 
     /// The rows from their parts.

@@ -56,8 +56,8 @@ pub struct Measure {
     pub siconos: f64,
     /// Infeasibility of the impulses: `‖(dist(x_c, K))_c‖ / ‖q‖`.
     pub primal: f64,
-    /// Infeasibility of the velocities: `‖(dist(ũ_c, K*))_c‖ / ‖q‖`; a distance with mu > 1 counts as if the same velocity were into an obstacle with mu = 1,
-    /// `√((1 + mu²)/2)` times more, because K* is then nearly the whole space.
+    /// Infeasibility of the velocities: `‖(dist(ũ_c, K*))_c‖ / ‖q‖`; of a contact with mu > 1 (mu_r > 1) by the cone and ũ of the same velocity with coefficients of 1, because K* is then nearly the whole
+    /// space.
     pub dual: f64,
     /// Complementarity: `Σ |x_c · ũ_c| / ‖q‖²`.
     pub complementarity: f64,

@@ -1,6 +1,9 @@
 //! Sums of matrix–vector products, row by row, plainly or in doubled precision.
 
-use nonsmooth_linalg::{Bsr, Compensated, Csc, Doubled, Matrix, norm_of};
+use nonsmooth_linalg::{Bsr, Compensated, Csc, Doubled, Matrix, norm_of, pieces};
+
+/// Fewer columns are not worth another thread.
+const COLUMNS: usize = 2000;
 
 /// One compensated sum for each row, and the sum of the sizes of its terms.
 #[derive(Debug, Clone, Default)]
@@ -22,6 +25,13 @@ impl Rows {
         self.sums.extend(x.iter().map(|&x| Compensated::from(x)));
         self.sizes.clear();
         self.sizes.extend(x.iter().map(|x| x.abs()));
+    }
+
+    /// Begins with the sums of others, and their precision.
+    pub(crate) fn start_from(&mut self, others: &Self) {
+        self.sums.clone_from(&others.sums);
+        self.sizes.clone_from(&others.sizes);
+        self.plainly = others.plainly;
     }
 
     /// Begins with `n` zeros.
@@ -78,22 +88,25 @@ impl Rows {
         }
     }
 
-    /// Adds `Aᵀ x`.
+    /// Adds `Aᵀ x`, column by column on all threads that the budget allows.
     pub(crate) fn add_transposed(&mut self, a: &Csc, x: &[f64]) {
-        if self.plainly {
-            for j in 0..a.ncols() {
+        let Self { sums, sizes, plainly } = self;
+        let rows = (&mut sums[..a.ncols()], &mut sizes[..a.ncols()]);
+        pieces::writing_both(COLUMNS, rows, |first, sums, sizes| {
+            if !*plainly {
+                return fused::add_transposed(sums, sizes, (a, first, x));
+            }
+            for (j, (of_sums, of_sizes)) in (first..).zip(sums.iter_mut().zip(sizes)) {
                 let (rows, values) = a.column(j);
-                let (mut sum, mut size) = (self.sums[j], self.sizes[j]);
+                let (mut sum, mut size) = (*of_sums, *of_sizes);
                 for (&i, &v) in rows.iter().zip(values) {
                     let product = v * x[i];
                     sum.add_plainly(product);
                     size += product.abs();
                 }
-                (self.sums[j], self.sizes[j]) = (sum, size);
+                (*of_sums, *of_sizes) = (sum, size);
             }
-        } else {
-            fused::add_transposed(&mut self.sums, &mut self.sizes, (a, x));
-        }
+        });
     }
 
     /// Adds `a b` to a row.
@@ -116,6 +129,11 @@ impl Rows {
     /// The sums, each rounded once.
     pub(crate) fn values(&self) -> impl Iterator<Item = f64> + Clone + '_ {
         self.sums.iter().map(|s| s.value())
+    }
+
+    /// The sums, each as a number and what it has lost.
+    pub(crate) fn parts(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.sums.iter().map(|s| s.into_parts())
     }
 
     /// The sums with all their digits. Each is wrong by at most [`doubt`]`(n)` times the size of its n terms.
@@ -186,7 +204,7 @@ mod fused {
         };
     }
     kernel!(add, add_by, Compensated, (f64, &Csc, &[f64]));
-    kernel!(add_transposed, add_transposed_by, Compensated, (&Csc, &[f64]));
+    kernel!(add_transposed, add_transposed_by, Compensated, (&Csc, usize, &[f64]));
     kernel!(add_blocks[const D], add_blocks_by, Compensated, (&Bsr<D>, &[f64]));
     kernel!(add_blocks_plainly[const D], add_blocks_plainly_by, f64, (&Bsr<D>, &[f64]));
 
@@ -209,9 +227,9 @@ mod fused {
     fn add_transposed_by<const FUSED: bool>(
         sums: &mut [Compensated],
         sizes: &mut [f64],
-        (a, x): (&Csc, &[f64]),
+        (a, first, x): (&Csc, usize, &[f64]),
     ) {
-        for (j, (sum, size)) in sums.iter_mut().zip(sizes).take(a.ncols()).enumerate() {
+        for (j, (sum, size)) in (first..).zip(sums.iter_mut().zip(sizes)) {
             let (rows, values) = a.column(j);
             for (&i, &v) in rows.iter().zip(values) {
                 sum.add_product_by::<FUSED>(v, x[i]);

@@ -17,7 +17,7 @@ use super::closures::Closure;
 use super::groups::Groups;
 use super::memory::{JACOBIANS, Memory, VALUES};
 use super::probe::{Seen, points, probed};
-use super::{Evaluator, Field, Pattern};
+use super::{Evaluator, Field, Pattern, tentatively};
 use crate::ProblemError;
 use crate::error::vector;
 
@@ -86,7 +86,7 @@ impl Differences {
         let change = |x: f64| x + 0.0123 * x.abs().max(1.0);
         let at = points(x).into_iter().map(|x| {
             let mut f = vec![0.0; n];
-            value(&x, &mut f);
+            tentatively(|| value(&x, &mut f));
             (x, f)
         });
         let at: Vec<_> = at.collect();
@@ -96,7 +96,8 @@ impl Differences {
                     for changed in [change, |_| f64::NAN] {
                         let mut y = x.clone();
                         set.iter().for_each(|&j| y[j] = changed(x[j]));
-                        value(&y, &mut f);
+                        // A failure is an answer as NaN is: it depends.
+                        tentatively(|| value(&y, &mut f));
                         for (i, seen) in seen.iter_mut().enumerate() {
                             let said = match before[i].is_finite() {
                                 false => Seen::Unknown,
@@ -179,7 +180,8 @@ impl Running {
             }
             let mut look = |side: &mut Vec<f64>, times: f64| {
                 columns.iter().for_each(|&j| y[j] = x[j] + times * step(x[j]));
-                (field.value)(y, side);
+                // Beside x F may not be defined.
+                tentatively(|| (field.value)(y, side));
             };
             let [up, down, far_up, far_down] = sides;
             look(up, 1.0);

@@ -588,3 +588,85 @@ fn the_floor_is_what_rounding_makes_of_a_solution() {
         assert_eq!(problem.measure(&point, &mut problem.gauge().unwrap()).floor, None);
     }
 }
+
+fn one_contact(w: [f64; 3], q: [f64; 3], mu: f64) -> FrictionLocal<3> {
+    let w = Bsr::from_csc(&Csc::diagonal(&w));
+    FrictionLocal::new(w, q.to_vec(), vec![mu]).unwrap()
+}
+
+/// The trace of an indefinite block cancels but for rounding: it is no unit for impulses, beside which every velocity would be large.
+#[test]
+fn a_trace_of_rounding_hides_no_velocity() {
+    for last in [-0.3, -0.300_000_000_000_000_04, -0.25] {
+        let p = one_contact([0.1, 0.2, last], [-0.1 + 5e-6, 0.0, 0.0], 0.5);
+        let point = LocalPoint { r: vec![1.0, 0.0, 0.0], lambda: vec![] };
+        let verdict = p.judge(&point, 1e-8).unwrap();
+        let found = verdict.measure.relative;
+        assert!(!verdict.solved && (found / 5e-5 - 1.0).abs() < 1e-3, "{last}: {found:e}");
+    }
+    // Nor is the mean of traces that cancel each other.
+    let blocks = [0.1, 0.1, 0.1, 0.2, 0.2, 0.2, -0.3, -0.3, -0.3];
+    let w = Bsr::<3>::from_csc(&Csc::diagonal(&blocks));
+    let mut q = vec![0.0; 9];
+    (q[0], q[3], q[6]) = (-0.1, 1.0, 0.3 + 5e-6);
+    let p = FrictionLocal::new(w, q, vec![0.5; 3]).unwrap();
+    let mut point = p.origin();
+    (point.r[0], point.r[6]) = (1.0, 1.0);
+    assert!(p.judge(&point, 1e-8).unwrap().measure.relative > 1e-6);
+}
+
+/// A velocity of δ into the obstacle is one of δ whatever the friction, with sliding or without; never less than `δ/√2`.
+#[test]
+fn a_velocity_into_the_obstacle_counts_the_same_whatever_the_friction() {
+    let delta = 1e-9;
+    for mu in [0.0, 0.5, 1.0, 100.0, 1e6, 1e12] {
+        let p = one_contact([1.0; 3], [-1.0, 0.0, 0.0], mu);
+        let of = |sliding: f64| {
+            let r = vec![1.0 - delta, sliding, 0.0];
+            p.judge(&LocalPoint { r, lambda: vec![] }, 1e-8).unwrap()
+        };
+        let dual = of(0.0).measure.dual;
+        assert!(of(0.0).solved && (dual / delta - 1.0).abs() < 1e-6, "{mu}: {dual:e}");
+        for sliding in [1e-3, 1.0, 3.0].map(|s| s * delta) {
+            let dual = of(sliding).measure.dual;
+            assert!(dual < 1.01 * delta && dual > 0.7 * delta, "{mu}: {dual:e}");
+        }
+    }
+}
+
+/// Where q vanishes, in the rounding of doubled precision, the residual is absolute, as where it is zero.
+#[test]
+fn loads_that_cancel_to_the_last_digit_are_none() {
+    let mut random = Pcg64::seed_from_u64(11);
+    for case in 0..300 {
+        let n = random.random_range(2..5);
+        let mut draw = |size: i32| f64::from(random.random_range(-size..=size));
+        let b: Vec<Vec<f64>> = (0..n).map(|_| (0..n).map(|_| draw(2)).collect()).collect();
+        let entry = |i: usize, j: usize| -> f64 {
+            (0..n).map(|k| b[i][k] * b[j][k]).sum::<f64>() + f64::from(u8::from(i == j))
+        };
+        let mass = (0..n).flat_map(|i| (0..n).map(move |j| (i, j)));
+        let m = Csc::from_triplets(n, n, mass.map(|(i, j)| (i, j, entry(i, j)))).unwrap();
+        let h: Vec<_> = (0..n).flat_map(|i| [(i, 0, draw(2)), (i, 1, draw(2))]).collect();
+        let h = Csc::from_triplets(n, 2, h.into_iter()).unwrap();
+        let v: Vec<f64> = (0..n).map(|_| draw(3)).collect();
+        let (mut f, mut w) = (vec![0.0; n], vec![0.0; 2]);
+        m.mul_add(1.0, &v, &mut f);
+        h.mul_transpose_add(-1.0, &v, &mut w);
+        let p = FrictionGlobal::<2>::new(m, h, f, w, vec![0.5]).unwrap();
+        let verdict = p.judge(&GlobalPoint { v, r: vec![0.0; 2], lambda: vec![] }, 1e-8).unwrap();
+        assert!(verdict.solved, "{case}: {:?}", verdict.measure);
+    }
+}
+
+/// With much friction what rounding makes of a velocity at rest comes back mu times as large.
+#[test]
+fn the_floor_grows_with_friction_where_a_contact_sticks() {
+    let floor = |mu: f64, pull: f64| {
+        let p = one_contact([1.0; 3], [-1.0, pull, 0.0], mu);
+        let point = LocalPoint { r: vec![1.0, -pull, 0.0], lambda: vec![] };
+        p.judge(&point, 1e-8).unwrap().measure.floor.unwrap()
+    };
+    let [usual, much] = [0.5, 1e8].map(|mu| floor(mu, 0.1));
+    assert!(usual < 1e-15 && much > 1e6 * usual && much < 1e8 * usual, "{usual:e} {much:e}");
+}

@@ -57,11 +57,12 @@ pub(super) struct Row {
     pub shift: [f64; 3],
     restitution: Restitution,
     pub r: [f64; 3],
-    /// Of rolling friction: the coefficient, the moments, and the given angular velocity of what is moved, in the law and in the energy.
+    /// Of rolling friction: the coefficient, the moments, the given angular velocity of what is moved, in the law and in the energy, and what the law adds to u_R⁺.
     pub mu_r: f64,
     pub moment: [f64; 2],
     pub turned: [f64; 2],
     pub turned_mean: [f64; 2],
+    pub turned_shift: [f64; 2],
     pub warm: bool,
 }
 
@@ -292,7 +293,7 @@ impl<'a> Meeting<'a> {
         }
         let mean = (1.0 - theta) / theta;
         row.shift[0] += mean * (row.before[0] - self.approach.min(0.0));
-        if self.takes_mean(lasting) {
+        if self.takes_mean(lasting, |known| known.stuck) {
             return;
         }
         let slip = sliding(self.bodies, self.near);
@@ -301,21 +302,31 @@ impl<'a> Meeting<'a> {
         }
     }
 
-    /// Whether Coulomb's law is that of u_θ.
-    fn takes_mean(&self, lasting: bool) -> bool {
-        let stuck = self.known.is_some_and(|m| m.stuck);
-        self.stride.scheme.impact == Impact::Fremond && !(lasting && stuck)
+    /// Whether the law of friction is that of u_θ: by Frémond's, unless what lasts was held in the step before.
+    fn takes_mean(&self, lasting: bool, held: impl FnOnce(&Remembered) -> bool) -> bool {
+        let held = self.known.is_some_and(held);
+        self.stride.scheme.impact == Impact::Fremond && !(lasting && held)
+    }
+
+    /// The relative angular velocity about a tangent at the beginning.
+    fn turning(&self, row: &Row, tangent: usize) -> f64 {
+        let free = row.arms.iter().zip(self.bodies).filter(|a| a.0.free);
+        // What is moved turns evenly.
+        free.fold(row.turned_mean[tangent], |u, (arm, m)| {
+            u + arm.sign * dot(row.frame[1 + tangent], m.omega(m.spin))
+        })
     }
 
     /// What the law adds to u⁺, and what it lets give way.
     fn take_law(&self, row: &mut Row, lasting: bool) {
         let Self { near, stride: Stride { scheme, h, .. }, .. } = self;
         let (law, gap, before) = (near.law, near.place.gap, row.before);
-        let share = match self.takes_mean(lasting) {
-            true => (1.0 - scheme.theta) / scheme.theta,
-            false => law.e_t,
-        };
+        let mean = (1.0 - scheme.theta) / scheme.theta;
+        let share = if self.takes_mean(lasting, |known| known.stuck) { mean } else { law.e_t };
         row.shift = [0.0, share * before[1], share * before[2]];
+        if row.mu_r > 0.0 && self.takes_mean(lasting, |known| known.unrolled) {
+            row.turned_shift = [0, 1].map(|k| mean * self.turning(row, k));
+        }
         if let Some(Compliance { stiffness, damping }) = near.compliance {
             let resistance = damping + h * stiffness;
             row.shift[0] = stiffness * gap / resistance;

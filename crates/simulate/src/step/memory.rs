@@ -89,7 +89,8 @@ impl Remembered {
             point: near.place.point,
             axis,
             active: row.is_some(),
-            stuck: row.is_some_and(|row| row.r[0] > 0.0 && sticks(&row.r, row.mu)),
+            stuck: row.is_some_and(|row| sticks(row.r[0], [row.r[1], row.r[2]], row.mu)),
+            unrolled: row.is_some_and(|row| sticks(row.r[0], row.moment, row.mu_r)),
         }
     }
 }
@@ -104,7 +105,7 @@ fn clipped(r: [f64; 3], mu: f64) -> [f64; 3] {
     [r[0], cut * r[1], cut * r[2]]
 }
 
-/// Whether an impulse lies within the cone, not on its boundary.
-fn sticks(r: &[f64; 3], mu: f64) -> bool {
-    r[1].hypot(r[2]) < (1.0 - 1e-6) * mu * r[0]
+/// Whether friction, or the moment of rolling friction, of what pushes lies within its disk, not on the boundary.
+fn sticks(normal: f64, [one, two]: [f64; 2], mu: f64) -> bool {
+    normal > 0.0 && one.hypot(two) < (1.0 - 1e-6) * mu * normal
 }

@@ -17,7 +17,8 @@
 //! pass; with the impulses found each body's rotation is solved exactly, and where that moves no velocity by more than the tolerance, the step is done.
 //! A large island that is slow and whose contacts are new is first asked whether it may stay at rest ([`crate::crew`]): a pile that can stand stands.
 //! What rests or rolls has w_N = 0 while it opens, until an impact in its island gives it e ([`crate::restitution`]).
-//! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺.
+//! A persistent contact has the velocity in its law at the extrapolated end of the step. Frémond's law has `w_T = (1 − θ)/θ u_{T,k}`: u_θ in place of u⁺,
+//! and so has rolling friction.
 //!
 //! References: Moreau1988 and Jean1999 for the scheme, Acary2016 for its energy, SimoWong1991 for the rotation, Acary2018 for the index set.
 //!
@@ -182,11 +183,13 @@ impl Tools {
             report.timings.total = begun.elapsed().as_secs_f64();
             Ok(report)
         };
-        if !self.begin(stride, state, forces) {
-            return ended(report, StepStatus::NotFinite);
-        }
+        let begins = self.begin(stride, state, forces);
+        // A factorisation that was cut short has left nothing finite.
         if budget::over() {
             return ended(report, CANCELLED);
+        }
+        if !begins {
+            return ended(report, StepStatus::NotFinite);
         }
         let detecting = Instant::now();
         self.detect(stride, state);

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use nonsmooth_linalg::{Block, Csc};
+use nonsmooth_linalg::{Block, Csc, budget};
 use nonsmooth_problem::factors::Factors;
 use nonsmooth_problem::{
     Bounds, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsLocal,
@@ -212,8 +212,13 @@ impl Tools {
             }
         }
         if !solids.is_empty() {
-            let touched = rows.iter().zip(&islands.of_item).filter(|row| is_due(*row.1));
-            touched.for_each(|(row, _)| solids.reach(row));
+            for (row, _) in rows.iter().zip(&islands.of_item).filter(|row| is_due(*row.1)) {
+                // Some solves with a large factor each.
+                if budget::over() {
+                    return 0.0;
+                }
+                solids.reach(row);
+            }
         }
         let parts = Parts { crew, islands, touching, due, rows, bodies, joints, solids };
         match stated {
@@ -744,7 +749,7 @@ impl Row {
             bodies: self.arms.each_ref().map(|a| a.free.then_some(a.owner)),
             rows: sides.each_ref().map(|s| angular(&s.rows)),
             solved: sides.each_ref().map(|s| angular(&s.solved)),
-            free: [0, 1].map(|k| self.turned[k] + spin(k)),
+            free: [0, 1].map(|k| self.turned[k] + self.turned_shift[k] + spin(k)),
             start: self.moment,
             sides: turning,
         }

@@ -548,6 +548,10 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
             if problem.follow_impulses(&mut first, judge) {
                 measure = problem.measure(&first, judge);
             }
+            // Who is given up may have no other point, and nobody looks at it again.
+            if measure.passes(limits.tolerance) {
+                measure = problem.certify(&first, judge);
+            }
             observer.best(&first, &measure);
             (first, measure)
         });
@@ -779,7 +783,8 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
             true => measure,
             false => {
                 let closely = !(late && hopeless);
-                or_start(self.problem, given, point, self.judge.gauge, measure, closely)
+                let how = (self.limits.tolerance, closely);
+                or_start(self.problem, given, point, self.judge.gauge, measure, how)
             }
         };
         // Plain arithmetic may have refused, at rounding level, what doubled precision accepts.
@@ -944,7 +949,7 @@ pub(crate) fn fallen_back<P: Problem>(
     measure
 }
 
-/// The start is one of the points that an unsolved problem's solve may return: where its residuals, certified if `closely`, are smaller than those of `point`, it takes its place. Cost: one
+/// The start is one of the points that an unsolved problem's solve may return: where its residuals, certified if `closely` or where it looks solved at the tolerance, are smaller than those of `point`, it takes its place. Cost: one
 /// judgement, of a global problem one more. Allocates nothing.
 pub(crate) fn or_start<P: Problem>(
     problem: &P,
@@ -952,18 +957,18 @@ pub(crate) fn or_start<P: Problem>(
     point: &mut P::Point,
     gauge: &mut P::Gauge,
     measure: Measure,
-    closely: bool,
+    (tolerance, closely): (f64, bool),
 ) -> Measure {
     if *start == *point {
         return measure;
     }
     let mut first = problem.measure(start, gauge);
     // A start is given by its impulses alone.
-    if problem.follow_impulses(start, gauge) || closely {
-        first = match closely {
-            true => problem.certify(start, gauge),
-            false => problem.measure(start, gauge),
-        };
+    if problem.follow_impulses(start, gauge) && !closely {
+        first = problem.measure(start, gauge);
+    }
+    if closely || first.passes(tolerance) {
+        first = problem.certify(start, gauge);
     }
     if !first.is_better_than(&measure) {
         return measure;

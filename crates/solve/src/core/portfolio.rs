@@ -371,7 +371,8 @@ impl<P: Registered> Session<P> for Portfolio<P> {
                     Some(gauge) if status != Status::Solved => {
                         let late = matches!(status, Status::Limit(Limit::Time | Limit::Cancelled));
                         let closely = !(late && is_hopeless(problem, &measure, limits));
-                        or_start(problem, point, &mut best, gauge, measure, closely)
+                        let how = (limits.tolerance, closely);
+                        or_start(problem, point, &mut best, gauge, measure, how)
                     }
                     _ => measure,
                 };

@@ -78,9 +78,9 @@ impl StepRule {
         }
     }
 
-    /// Lengthens the next step where the last was timid.
+    /// Lengthens the next step where the last was timid, or so short that rounding undid it: then the ratio is NaN. What is too long is shortened again as soon as something moves.
     pub(crate) fn adapt(&self, ratio: f64, rho: &mut f64) {
-        if ratio < self.grow_below {
+        if ratio < self.grow_below || ratio.is_nan() {
             // An infinite step could not be shortened again.
             *rho = (*rho / self.shrink).min(LONGEST);
         }
@@ -98,5 +98,14 @@ mod tests {
         assert!(rho.is_finite());
         let ratio = rule.shorten(&mut rho, |rho| rho);
         assert!(ratio <= rule.accept && rho == ratio);
+    }
+
+    #[test]
+    fn a_step_that_moves_nothing_grows() {
+        let (rule, mut rho) = (StepRule::default(), 1.0);
+        (0..100).for_each(|_| rule.adapt(f64::NAN, &mut rho));
+        assert!(rho > 1e16, "{rho}");
+        (0..10_000).for_each(|_| rule.adapt(f64::NAN, &mut rho));
+        assert!(rho.is_finite());
     }
 }

@@ -54,9 +54,11 @@ impl<P: Problem, R: Reformulation<P>> Lifted<'_, P, R> {
     /// The measure of a point of the other problem; kept where it is the best.
     fn see(&mut self, point: &<R::To as Problem>::Point, closely: bool) -> Measure {
         self.reformulation.lift(self.problem, point, self.memo, &mut self.trial);
-        let measure = match closely {
-            true => self.problem.certify(&self.trial, self.gauge),
-            false => self.problem.measure(&self.trial, self.gauge),
+        let plain = (!closely).then(|| self.problem.measure(&self.trial, self.gauge));
+        // What looks solved is decided in doubled precision: nobody may look again.
+        let measure = match plain {
+            Some(measure) if !measure.passes(self.tolerance) => measure,
+            _ => self.problem.certify(&self.trial, self.gauge),
         };
         // What passes counts as the best: `own` is no part of the merit.
         let better = measure.passes(self.tolerance) || measure.is_better_than(&self.best.1);

@@ -406,3 +406,21 @@ fn a_better_start_does_not_replace_the_answer() {
         }
     }
 }
+
+/// A matrix that takes more memory than is allowed is refused by name before it is made.
+#[test]
+fn matrices_beyond_the_memory_are_refused() {
+    let (problem, _) = Planted { contacts: 20, dofs: 90, ..Planted::default() }.local::<3>();
+    let limits = Limits { memory_limit: Some(10_000), ..limits() };
+    let refused = |session: &mut dyn Session<_>| {
+        session.solve(&problem, &mut problem.origin(), &limits, &mut |_| {}).unwrap_err()
+    };
+    for error in [
+        refused(&mut driver(FacetInner::<3>(facets(8)))),
+        refused(&mut driver(FacetOuter::<3>(facets(8)))),
+    ] {
+        let says = error.to_string();
+        assert!(says.contains("the matrix with facets would take about"), "{says}");
+        assert!(says.contains("the memory limit is"), "{says}");
+    }
+}

@@ -1,6 +1,6 @@
 //! The registry: what it refuses, and that methods that share nothing agree.
 
-use nonsmooth_linalg::Csc;
+use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Problem};
 use nonsmooth_solve::registry::{abouts, session};
@@ -107,5 +107,20 @@ fn a_start_that_is_far_too_large_is_no_end() {
                 assert_eq!(outcome.status, Status::Solved, "{name} from {size:e} to {tolerance:e}");
             }
         }
+    }
+}
+
+/// A contact between two bodies whose motion is given has no block in W: what it pressed with in the step before is taken back where it opens.
+#[test]
+fn a_contact_without_a_block_does_not_keep_its_impulse() {
+    let w = Csc::from_triplets(6, 6, (0..3).map(|i| (i, i, 1.0))).unwrap();
+    let q = vec![-1.0, 0.0, 0.0, 1.0, 0.0, 0.0];
+    let problem = FrictionLocal::<3>::new(Bsr::from_csc(&w), q, vec![0.5; 2]).unwrap();
+    for name in ["nsgs", "nsgs_colored", "psor", "auto"] {
+        let mut session = session(name, &SettingsMap::new()).unwrap();
+        let mut point = problem.origin();
+        point.r.copy_from_slice(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+        let outcome = session.solve(&problem, &mut point, &Limits::default(), &mut |_| {}).unwrap();
+        assert_eq!(outcome.status, Status::Solved, "{name}: {:?}", point.r);
     }
 }

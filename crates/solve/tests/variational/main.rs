@@ -1,8 +1,11 @@
 //! Variational inequalities: projections, solvers on problems with known solutions, multipliers, what ends badly.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use nonsmooth_linalg::Csc;
 use nonsmooth_problem::check::{Judged, SetStatus};
-use nonsmooth_problem::field::{Closures, Differences, Expressions, Field, Pattern};
+use nonsmooth_problem::field::{Closures, Differences, Expressions, Field, Pattern, is_tentative};
 use nonsmooth_problem::{LcpPoint, Problem, Set, Vi};
 use nonsmooth_solve::variational::Projector;
 use nonsmooth_solve::variational::reform::Multipliers;
@@ -199,6 +202,46 @@ fn projections_agree_with_those_of_the_judge() {
             let measure = problem.judge(&LcpPoint { z: y }, 1e-10).unwrap().measure;
             assert!(measure.relative < 1e-12 && measure.primal < 1e-12, "{trial}: {measure:?}");
         }
+    }
+}
+
+/// At the start x − ρ F(x) rounds to x.
+#[test]
+fn values_far_smaller_than_variables_are_no_end_of_the_way() {
+    for size in [1e-10, 1e-17, 1e-40] {
+        let rows = ["0.25", "0.125"].iter().enumerate();
+        let rows = rows.map(|(i, x)| format!("{size:e}*(x{} - {x})", i + 1));
+        let ball = Set::Ball { centre: vec![0.0; 2], radius: 1.0 };
+        let problem = Vi::new(expressions(rows), ball, vec![0.5, 0.25]).unwrap();
+        for name in ["auto", "fixed_point", "extragradient", "hyperplane"] {
+            let answer = solve(name, &problem, 1e-8);
+            assert!(answer.is_solved(), "{name}, {size:e}: {}", answer.status);
+            assert!(answer.iterations < 1000, "{name}, {size:e}: {}", answer.iterations);
+        }
+    }
+}
+
+/// What fails aloud beyond its domain, but where it is only asked whether it is defined.
+#[test]
+fn trial_steps_ask_in_silence() {
+    let loud = Arc::new(AtomicBool::new(false));
+    let told = loud.clone();
+    let root = move |x: &[f64], f: &mut [f64]| {
+        if x[0] < 0.0 && !is_tentative() {
+            told.store(true, Ordering::Relaxed);
+        }
+        // From 4 the first step leads to −3.6.
+        f[0] = if x[0] < 0.0 { f64::NAN } else { 4.0 * x[0].sqrt() - 0.4 };
+    };
+    let field = Differences::new(Pattern::dense(1), root).unwrap();
+    let line = Set::Box { lower: vec![f64::NEG_INFINITY], upper: vec![f64::INFINITY] };
+    let problem = Vi::new(field, line, vec![4.0]).unwrap();
+    // `hyperplane` goes beyond its prediction, and out of the domain where no set holds it back.
+    for name in ["fixed_point", "extragradient"] {
+        let answer = solve(name, &problem, 1e-8);
+        assert!(answer.is_solved(), "{name}: {}", answer.status);
+        close(&answer.point.z, &[0.01], 1e-6, name);
+        assert!(!loud.load(Ordering::Relaxed), "{name}");
     }
 }
 

@@ -285,7 +285,15 @@ fn power<T: Number>(a: T, b: T) -> T {
     if y == 0.5 && x >= 0.0 {
         return a.sqrt();
     }
+    if is_pole(x, y) {
+        return T::known(f64::NAN);
+    }
     a.smooth2(b, x.powf(y), slopes2(Binary::Pow, x, y, x.powf(y)))
+}
+
+/// Whether x^y is a pole: it has no value there, for what is made of ∞ may be finite.
+fn is_pole(x: f64, y: f64) -> bool {
+    x == 0.0 && y < 0.0
 }
 
 /// 1 or 0.
@@ -309,8 +317,9 @@ impl Unary {
             Self::Sqrt => return a.sqrt(),
             Self::Square => return a.mul(a),
             Self::Exp => x.exp(),
-            // At zero it has no value: what is made of −∞ may be finite.
+            // At a pole it has no value: what is made of ∞ may be finite.
             Self::Log | Self::Log10 if x == 0.0 => f64::NAN,
+            Self::Atanh if x.abs() == 1.0 => f64::NAN,
             Self::Log => x.ln(),
             Self::Log10 => x.log10(),
             Self::Sin => x.sin(),
@@ -394,7 +403,9 @@ impl Binary {
             }
             Self::Rem => x % y,
             Self::Atan2 => x.atan2(y),
+            Self::SignPow if is_pole(x, y) => f64::NAN,
             Self::SignPow => x.signum() * x.abs().powf(y),
+            Self::IntDiv if y == 0.0 => f64::NAN,
             Self::IntDiv => (x / y).trunc(),
             Self::Precision if x == 0.0 => 0.0,
             Self::Precision => {

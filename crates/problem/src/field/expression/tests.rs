@@ -162,6 +162,12 @@ fn what_is_undefined_stays_so() {
         ("1^sqrt(x)", -2.0),
         ("1 + exp(log(x))", 0.0),
         ("max(log(x), x)", 0.0),
+        ("atan(x^(-0.5))", 0.0),
+        ("min(1, x^(0 - x - 0.5))", 0.0),
+        ("min(1, signpow(x, -1))", 0.0),
+        ("exp(-div(1, x))", 0.0),
+        ("tanh(atanh(x/4))", 4.0),
+        ("1/atanh(x/4)", -4.0),
     ] {
         let field = Expressions::parse(&[text.into()], &["x".into()]).unwrap();
         let mut run = field.evaluator();

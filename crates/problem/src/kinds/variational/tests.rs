@@ -254,6 +254,27 @@ fn variables_that_no_row_ties_are_judged_each_by_itself() {
     }
 }
 
+/// Inside of a set that joins variables each row of F vanishes by itself; on its border they belong together.
+#[test]
+fn inside_of_a_set_no_row_hides_behind_another() {
+    let f = || Expressions::parse(&["x1 - 1".into(), "1e9*(x2 - 1)".into()], &[]).unwrap();
+    let row = |b: f64| {
+        let sum = Csc::from_triplets(1, 2, [(0, 0, 1.0), (0, 1, 1.0)].into_iter()).unwrap();
+        Set::inequalities(sum, vec![b])
+    };
+    let ball = |radius: f64| Set::Ball { centre: vec![0.0; 2], radius };
+    for set in [ball(10.0), row(10.0)] {
+        let problem = Vi::new(f(), set, vec![0.0; 2]).unwrap();
+        let solved = |z: [f64; 2]| problem.judge(&LcpPoint { z: z.to_vec() }, 1e-8).unwrap().solved;
+        assert!(!solved([3.6e-8, 1.0]) && !solved([1.1, 1.0]), "{}", problem.set);
+        assert!(solved([1.0, 1.0]) && solved([1.0 + 1e-9, 1.0]), "{}", problem.set);
+    }
+    // On the border F is a multiple of the normal.
+    let problem = Vi::new(f(), row(1.0), vec![0.0; 2]).unwrap();
+    let point = LcpPoint { z: vec![1e-9, 1.0 - 1e-9] };
+    assert!(problem.judge(&point, 1e-8).unwrap().solved);
+}
+
 #[test]
 fn mistakes_are_named() {
     let field = || Expressions::parse(&["x1".into(), "x2".into()], &[]).unwrap();

@@ -1,6 +1,10 @@
 //! Elastic boxes of scenes against closed forms.
 
-use nonsmooth_simulate::{BodyId, Control, SceneFile, Simulation, StepReport};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nonsmooth_simulate::{BodyId, Control, SceneFile, Simulation, StepReport, StepStatus};
+use nonsmooth_solve::{Limit, Limits, Status};
 
 use crate::verification::near;
 
@@ -178,4 +182,32 @@ fn what_elastic_boxes_do_not_do_is_an_error_by_name() {
     let all = [time, "\n[pairs_default]\nmu_rolling = 0.1", FLOOR, BLOCK].concat();
     let error = scene(&all).build().map(drop).unwrap_err().to_string();
     assert!(error.starts_with("pairs_default.mu_rolling: expected 0"), "{error}");
+}
+
+/// A limit that ends a step while the solids are prepared, which takes long where they are large, ends it as cancelled: nothing has lost its numbers.
+#[test]
+fn a_limit_while_solids_are_prepared_is_no_loss_of_numbers() {
+    let scene = scene(
+        "time = { h = 1e-3, end = 1 }
+         pairs_default = {}
+         [[bodies]]
+         name = 'floor'
+         shape = { kind = 'plane' }
+         fixed = true
+         [[elastic]]
+         name = 'cube'
+         half = [0.5, 0.5, 0.5]
+         divisions = [8, 8, 8]
+         young = 1e7
+         density = 1000
+         position = [0, 0, 0.5]",
+    );
+    let flag = Arc::new(AtomicBool::new(false));
+    let limits = Limits { cancel: Some(flag.clone()), ..Limits::default() };
+    let mut cube = scene.build().unwrap().with_limits(limits);
+    flag.store(true, Ordering::Relaxed);
+    let cancelled = StepStatus::Solver(Status::Limit(Limit::Cancelled));
+    assert_eq!(cube.step(1e-3).unwrap().status, cancelled);
+    flag.store(false, Ordering::Relaxed);
+    assert_eq!(cube.step(1e-3).unwrap().status, StepStatus::Solved);
 }

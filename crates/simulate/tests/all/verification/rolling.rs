@@ -1,6 +1,6 @@
 //! Rolling friction in motion: a ball that comes to rest, slopes, what turns, a ball upon another one; and the energy of each step.
 
-use nonsmooth_simulate::{Body, Law, Motion, Part, Shape, Simulation, World};
+use nonsmooth_simulate::{Body, Impact, Law, MoreauJean, Motion, Part, Shape, Simulation, World};
 
 use super::{G, ball, simulation};
 
@@ -144,4 +144,37 @@ fn a_disc_comes_to_rest_on_its_face() {
     assert!(passed.next().is_none());
     let (v, spin) = (simulation.state().velocity[id.index()], simulation.state().spin[id.index()]);
     assert!(v.iter().chain(&spin).all(|x| x.abs() < 1e-12), "{v:?} {spin:?}");
+}
+
+/// A ball that is dropped as it slides: by Frémond's law no impact gains energy with rolling friction, and what is held does not turn to and fro.
+#[test]
+fn fremonds_law_gains_no_energy_with_rolling_friction() {
+    for (mu_r, e) in [(0.1, 1.0), (0.1, 0.8), (0.1, 0.5), (0.01, 0.8), (0.1, 0.0)] {
+        let law = Law { mu: 2.0, mu_r, e, ..Law::default() };
+        let mut world = World::new([0.0, 0.0, -G]).with_law(law);
+        world.add(Body::floor());
+        let body = ball(RADIUS).at([0.0, 0.0, 0.15]).moving([3.0, 0.0, 0.0], [0.0; 3]);
+        let id = world.add(body);
+        let scheme = MoreauJean { impact: Impact::Fremond, ..MoreauJean::default() };
+        let mut simulation = Simulation::new(world, scheme).unwrap();
+        let (mut before, mut impacts) = (f64::INFINITY, 0);
+        for _ in 0..400 {
+            let report = simulation.step(1e-3).unwrap();
+            let energy = report.energy;
+            assert!(report.status.is_solved() && energy.relative_imbalance() <= 1e-12);
+            let now = energy.kinetic + energy.potential;
+            assert!(now <= before + 1e-8 * energy.scale, "{mu_r} {e}: {now} {before}");
+            // There is one contact: its work is that of all.
+            let work = energy.normal + energy.tangential;
+            assert!(work <= 1e-8 * energy.scale, "{mu_r} {e}: {work}");
+            impacts += usize::from(report.counts.active > 0);
+            before = now;
+        }
+        assert!(impacts > 0);
+        if e == 0.0 {
+            let (v, spin) =
+                (simulation.state().velocity[id.index()], simulation.state().spin[id.index()]);
+            assert!(v.iter().chain(&spin).all(|x| x.abs() < 1e-9), "{v:?} {spin:?}");
+        }
+    }
 }

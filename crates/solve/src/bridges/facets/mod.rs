@@ -19,7 +19,7 @@ mod outer;
 pub use inner::{FacetInner, InnerMemo};
 pub use outer::{FacetOuter, OuterMemo};
 
-use nonsmooth_linalg::{Csc, Matrix};
+use nonsmooth_linalg::{Csc, Matrix, budget};
 use nonsmooth_problem::FrictionLocal;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -86,9 +86,15 @@ impl Facets {
     /// What is kept of a problem.
     fn keep<const D: usize>(&self, problem: &FrictionLocal<D>) -> Result<Kept<D>, SolveError> {
         self.validate().map_err(|found| SolveError::needs("facets in their range", found))?;
-        Kept::new(problem, self.directions::<D>())
+        let directions = self.directions::<D>();
+        let entries = problem.W.nblocks() * (1 + directions.len()).pow(2);
+        budget::admit("the matrix with facets", AN_ENTRY * entries as f64)?;
+        Kept::new(problem, directions)
     }
 }
+
+/// What an entry takes, in bytes, while the matrix is made of triplets.
+const AN_ENTRY: f64 = 64.0;
 
 /// Whether the contacts of dimension D are approximated.
 const fn approximates<const D: usize>() -> Option<&'static str> {

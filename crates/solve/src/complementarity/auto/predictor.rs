@@ -6,6 +6,7 @@
 //! References: Josephy1979; GraserKornhuber2009. Cost: some dozen passes over JF for each of a dozen steps, three times at most. Fails: where JF is indefinite at x, and leaves x as it was.
 
 use nonsmooth_linalg::{Csc, Matrix, norm};
+use nonsmooth_problem::field::tentatively;
 use nonsmooth_problem::{BoxLcp, LcpPoint, Mcp};
 
 use super::Portfolio;
@@ -65,7 +66,7 @@ impl Predictor {
             start.iter().zip(bounds()).map(|(x, (l, u))| x.max(*l).min(*u)).collect();
         let (mut best, mut first, mut last) = (None, 0.0, f64::INFINITY);
         for round in 0..=ROUNDS {
-            let smooth = evaluator.jacobian(&x, &mut f, &mut values);
+            let smooth = tentatively(|| evaluator.jacobian(&x, &mut f, &mut values));
             if !smooth || f.iter().chain(&values).any(|x| !x.is_finite()) {
                 return best;
             }

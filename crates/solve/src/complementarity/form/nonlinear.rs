@@ -2,7 +2,7 @@
 
 use nonsmooth_linalg::{Csc, Matrix};
 use nonsmooth_problem::Mcp;
-use nonsmooth_problem::field::{Evaluator, Pattern};
+use nonsmooth_problem::field::{Evaluator, Pattern, tentatively};
 
 /// `l ≤ x ≤ u ⟂ F(x) + λ(x − c)` with its values and Jacobians; λ = 0 unless a proximal method sets it.
 pub struct Model {
@@ -142,10 +142,10 @@ impl Model {
         }
     }
 
-    /// F(x). False where it is not defined.
+    /// F(x). False where it is not defined: a step that leaves its domain is a try.
     pub fn value(&mut self, x: &[f64], f: &mut [f64]) -> bool {
         self.evaluations[0] += 1;
-        let defined = self.field.value(x, f);
+        let defined = tentatively(|| self.field.value(x, f));
         self.apply_weights(f);
         self.add_term(x, f);
         defined
@@ -190,7 +190,7 @@ impl Model {
                 y[j] = if x[j] + d <= u { x[j] + d } else { x[j] - d };
             }
             self.evaluations[1] += 1;
-            self.field.jacobian(y, scratch, &mut self.values)
+            tentatively(|| self.field.jacobian(y, scratch, &mut self.values))
         })
     }
 

@@ -27,7 +27,6 @@ use super::nsgs::{LocalChoice, with_local};
 use crate::contact::form::{Access, Concurrent, Disked, Frictional};
 use crate::contact::law::Rolling;
 use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
-use crate::contact::parts::NEGLIGIBLE;
 use crate::contact::splitting::coloring::Coloring;
 use crate::contact::splitting::team::Team;
 use crate::core::ranges::{at_least, at_most, below};
@@ -159,7 +158,7 @@ impl Moves {
         c: usize,
         answer: &Answer<D>,
     ) {
-        if answer.moved > NEGLIGIBLE {
+        if answer.made {
             self.any = true;
             r[D * c..D * c + D].copy_from_slice(&answer.new);
             problem.moved(state, c, &answer.dr);

@@ -5,6 +5,7 @@ use nonsmooth_linalg::small;
 use crate::contact::form::Contacts;
 use crate::contact::law::ContactLaw;
 use crate::contact::law::local::{LocalSolver, frictionless};
+use crate::contact::parts::NEGLIGIBLE;
 
 /// What the sweeps keep of a contact.
 pub(super) struct Contact<Memo, Law, const D: usize> {
@@ -27,6 +28,8 @@ pub(super) struct Answer<const D: usize> {
     pub(super) dr: [f64; D],
     /// `(w_c‖Δr_c‖/‖q‖)²`.
     pub(super) moved: f64,
+    /// The move is to be made: it is not negligible, or of an empty block, which feels nothing of it.
+    pub(super) made: bool,
 }
 
 impl<Memo, Law: ContactLaw<D>, const D: usize> Contact<Memo, Law, D> {
@@ -73,6 +76,7 @@ impl<Memo, Law: ContactLaw<D>, const D: usize> Contact<Memo, Law, D> {
             dr[k] -= old[k];
         }
         let moved = dr.iter().map(|x| (self.unit * x).powi(2)).sum();
-        Answer { new, dr, moved }
+        let unfelt = self.unit == 0.0 && dr != [0.0; D];
+        Answer { new, dr, moved, made: moved > NEGLIGIBLE || unfelt }
     }
 }

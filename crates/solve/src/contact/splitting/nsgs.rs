@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 use crate::contact::form::{AHEAD, Access, Blockwise, Disked, Frictional, put_within_cones};
 use crate::contact::law::Rolling;
 use crate::contact::law::local::{Exact, LocalSolver, Quartic, RollingExact};
-use crate::contact::parts::{Accelerator, NEGLIGIBLE, put_within_bounds, sweep_rows};
+use crate::contact::parts::{Accelerator, put_within_bounds, sweep_rows};
 use crate::contact::splitting::ordering::{Order, Ordering};
 use crate::core::ranges::{at_least, at_most, below};
 use crate::core::register::{About, Described, Solves};
@@ -321,8 +321,8 @@ where
             }
             let old: [f64; D] = small::block(r, c);
             let u = problem.velocity(state, r, c);
-            let Answer { new, dr, moved } = contact.answer(&*local, &u, &old, omega);
-            if moved > NEGLIGIBLE {
+            let Answer { new, dr, moved, made } = contact.answer(&*local, &u, &old, omega);
+            if made {
                 still = false;
                 r[D * c..D * c + D].copy_from_slice(&new);
                 problem.moved(state, c, &dr);

@@ -101,7 +101,7 @@ impl State {
             if !self.project(x, rho, |state| &state.f) {
                 return f64::NAN;
             }
-            if !self.field.value(&self.trial, &mut self.trial_f) {
+            if !tentatively(|| self.field.value(&self.trial, &mut self.trial_f)) {
                 return f64::INFINITY;
             }
             let differences = || {

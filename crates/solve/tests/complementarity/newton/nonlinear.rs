@@ -1,6 +1,9 @@
 //! Newton's methods on the functions of the lecture, for nonlinear problems: the linearisation against differences, solutions against planted ones and another method.
 
-use nonsmooth_problem::field::Expressions;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use nonsmooth_problem::field::{Differences, Expressions, is_tentative};
 use nonsmooth_problem::planted::{HarkerPang, NashCournot};
 use nonsmooth_problem::{LcpPoint, Mcp};
 use nonsmooth_solve::Solve;
@@ -132,4 +135,28 @@ fn rho_is_positive() {
     let refused = Solve::new().solver("newton_min_rho").set("rho", 0.0).run(&of_all_bounds());
     let said = refused.unwrap_err().to_string();
     assert!(said.contains("rho: expected a positive number, found 0"), "{said}");
+}
+
+/// What fails aloud beyond its domain, but where it is only asked whether it is defined.
+#[test]
+fn trial_steps_ask_in_silence() {
+    let loud = Arc::new(AtomicBool::new(false));
+    let told = loud.clone();
+    let root = move |x: &[f64], f: &mut [f64]| {
+        if x[0] < 0.0 && !is_tentative() {
+            told.store(true, Ordering::Relaxed);
+        }
+        // From 4 Newton's step leads to −3.6.
+        f[0] = if x[0] < 0.0 { f64::NAN } else { 4.0 * x[0].sqrt() - 0.4 };
+    };
+    let field = Differences::probed(&[4.0], root).unwrap();
+    let inf = f64::INFINITY;
+    let problem = Mcp::new(field, vec![-inf], vec![inf], vec![4.0]).unwrap();
+    let others = ["auto", "path", "semismooth", "miles"];
+    for name in METHODS.iter().map(|m| m.0).chain(others) {
+        let answer = Solve::new().solver(name).run(&problem).unwrap();
+        assert!(answer.is_solved(), "{name}: {}", answer.status);
+        assert!((answer.point.z[0] - 0.01).abs() < 1e-6, "{name}: {:?}", answer.point.z);
+        assert!(!loud.load(Ordering::Relaxed), "{name}");
+    }
 }

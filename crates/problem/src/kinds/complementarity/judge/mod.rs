@@ -246,8 +246,21 @@ pub(crate) fn lesser(a: f64, b: f64) -> f64 {
     if a > 0.0 && b > 0.0 { a.min(b) } else { a.max(b) }
 }
 
-/// Units of rows that have none, from their neighbours: `ω_i = max_j |J_ij| ζ_j`, `ζ_j = max_k ω_k / |J_kj|`.
-pub(crate) fn hand_on(units: &mut Vec<f64>, pattern: &Pattern, jacobian: &[f64]) {
+/// How large a variable that starts at `start` is at most, as far as its bounds say: the smaller modulus of two of them, for one that is far off says nothing; infinite where none is finite
+/// and other than zero.
+pub(crate) fn reach(start: f64, lower: f64, upper: f64) -> f64 {
+    let size = |bound: f64| if bound.is_finite() { bound.abs() } else { 0.0 };
+    let bounds = lesser(size(lower), size(upper));
+    if bounds > 0.0 { bounds.max(start.abs()) } else { f64::INFINITY }
+}
+
+/// Units of rows that have none, from their neighbours: `ω_i = max_j |J_ij| ζ_j`, `ζ_j = max_k ω_k / |J_kj|`, at most the reach of variable j.
+pub(crate) fn hand_on(
+    units: &mut Vec<f64>,
+    pattern: &Pattern,
+    jacobian: &[f64],
+    reach: impl Fn(usize) -> f64,
+) {
     let mut columns = vec![0.0_f64; units.len()];
     for _ in 0..GENERATIONS {
         if units.iter().all(|u| *u > 0.0) {
@@ -255,7 +268,7 @@ pub(crate) fn hand_on(units: &mut Vec<f64>, pattern: &Pattern, jacobian: &[f64])
         }
         let places = || pattern.places().zip(jacobian).filter(|(_, a)| **a != 0.0);
         for ((k, j), a) in places().filter(|((k, _), _)| units[*k] > 0.0) {
-            columns[j] = columns[j].max(units[k] / a.abs());
+            columns[j] = columns[j].max((units[k] / a.abs()).min(reach(j)));
         }
         let mut grown = false;
         let mut next = units.clone();

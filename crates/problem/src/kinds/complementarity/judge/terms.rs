@@ -40,6 +40,8 @@ pub(crate) struct Terms {
     /// The point last looked at, and whether precisely: it is not asked twice, for a caller's F may take its time. Empty where F was not defined, or the time was over.
     at: Vec<f64>,
     exactly: bool,
+    /// The time was over before the Jacobian was known, so that sizes and distances say less than they might.
+    pub(crate) cut_short: bool,
     moved: [Vec<f64>; 4],
 }
 
@@ -54,19 +56,21 @@ impl Terms {
             smooth: false,
             at: vec![],
             exactly: false,
+            cut_short: false,
             moved: [zeros(), zeros(), zeros(), zeros()],
         }
     }
 
     /// Looks at x; `precisely` F is evaluated as exactly as it can be, and a Jacobian that says the sizes is held against F. False where F is not defined.
     pub(crate) fn look(&mut self, pattern: &Pattern, x: &[f64], precisely: bool) -> bool {
-        // Where the time is over what is known has to do.
-        if self.at == x && (self.exactly || !precisely || budget::over()) {
+        // What decides does so whether or not the time is over: plain arithmetic takes 1/∞ for a value.
+        if self.at == x && (self.exactly || !precisely) {
             return true;
         }
         self.at.clear();
-        let Self { field, f, jacobian, sizes, smooth, .. } = self;
+        let Self { field, f, jacobian, sizes, smooth, cut_short, .. } = self;
         *smooth = field.jacobian(x, f, jacobian);
+        *cut_short = !*smooth && budget::over();
         let known = field.sizes(x, sizes);
         // Who does not know the terms has no better value of F either.
         let defined = match (*smooth, precisely && known) {
@@ -99,17 +103,19 @@ impl Terms {
     /// The units of rows by the point last looked at: the sizes, or what neighbours hand on; and the largest size.
     fn units(&self, pattern: &Pattern) -> (Vec<f64>, f64) {
         let mut units = self.sizes.clone();
-        hand_on(&mut units, pattern, &self.jacobian);
+        hand_on(&mut units, pattern, &self.jacobian, |_| f64::INFINITY);
         (units, self.sizes.iter().fold(0.0, |most, d| most.max(*d)))
+    }
+
+    /// What a change of all variables by half their last bit makes of `F_i`.
+    pub(crate) fn rounding(&self, pattern: &Pattern, x: &[f64], i: usize) -> f64 {
+        0.5 * f64::EPSILON * along(pattern, &self.jacobian, i, x, f64::abs)
     }
 
     /// A Jacobian is a claim, and of this point alone: of a row of which F does not change as it says, `|F_i|` and the change count in place of its terms, if they are smaller.
     ///
     /// `|F_i(x ± h d) − F_i(x) ∓ h Σ_j J_ij d_j| > h Σ_j |J_ij x_j| / 10` on both sides (at kinks one is enough), for d_j of random sign between `|x_j|/2` and `|x_j|`. Two values of F.
     fn distrust(&mut self, pattern: &Pattern, x: &[f64]) {
-        if budget::over() {
-            return;
-        }
         let Self { field, f, jacobian, sizes, moved: [y, up, down, d], .. } = self;
         let mut random = Pcg64::seed_from_u64(1);
         for (d, x) in d.iter_mut().zip(x) {
@@ -163,7 +169,8 @@ fn along(pattern: &Pattern, jacobian: &[f64], i: usize, d: &[f64], of: impl Fn(f
 pub(crate) struct Units {
     /// Those at the start or, where they vanish there, what a change of the other rows by their own makes of the row.
     start: Vec<f64>,
-    /// The smaller of the same at the point nearest to zero that is allowed, and far beyond the start; zero where they are not known.
+    /// The smaller of the same at the point nearest to zero that is allowed, and far beyond the start; zero where they are not known. Of rows that vanish at the start what the
+    /// neighbours' sizes at the point last looked at make of them, as far as the variables reach.
     elsewhere: Vec<f64>,
     /// The sizes on the way between these points at which rows lie level, far below both; zero where there are none, or none were asked for.
     level: Vec<f64>,
@@ -172,16 +179,26 @@ pub(crate) struct Units {
     /// Sizes at the start, and the points near zero and far from it until they are asked: sizes that become smaller from one to the next vanish there.
     own: Vec<f64>,
     unasked: Vec<Vec<Vec<f64>>>,
+    /// How far variables reach, and the Jacobian at the start, where rows vanish there.
+    handed: Option<(Vec<f64>, Vec<f64>)>,
     /// The start and the point nearest to zero, until the way between them is asked.
     way: Option<[Vec<f64>; 2]>,
     expressions: bool,
+    /// The time was over before all was known that the point last looked at is to be measured by.
+    pub(crate) cut_short: bool,
 }
 
 impl Units {
-    /// Of a problem that begins at `start`; `zero` is what is nearest to zero of all that is allowed.
+    /// Of a problem that begins at `start`; `zero` is what is nearest to zero of all that is allowed, `reach` how far each variable reaches.
     ///
     /// Expressions are asked there at once; functions of a caller's, which may be slow or know their neighbourhood alone, only where it matters, and a bit beside it.
-    pub(crate) fn new(field: &dyn Field, terms: &mut Terms, start: &[f64], zero: Vec<f64>) -> Self {
+    pub(crate) fn new(
+        field: &dyn Field,
+        terms: &mut Terms,
+        start: &[f64],
+        zero: Vec<f64>,
+        reach: Vec<f64>,
+    ) -> Self {
         let zeros = || vec![0.0; start.len()];
         let mut units = Self {
             start: zeros(),
@@ -190,12 +207,18 @@ impl Units {
             largest: (0.0, 0.0),
             own: vec![],
             unasked: vec![],
+            handed: None,
             way: None,
             expressions: field.expressions().is_some(),
+            cut_short: false,
         };
         terms.look(field.pattern(), start, !units.expressions);
         (units.start, units.largest.0) = terms.units(field.pattern());
         units.own.clone_from(&terms.sizes);
+        if terms.smooth && units.own.contains(&0.0) {
+            units.handed = Some((reach, terms.jacobian.clone()));
+            units.hand_on(field.pattern(), &terms.sizes);
+        }
         if zero != start {
             let beside =
                 |part: f64| zero.iter().zip(start).map(|(z, s)| z + part * (s - z)).collect();
@@ -218,6 +241,7 @@ impl Units {
         x: &[f64],
         precisely: bool,
     ) -> bool {
+        self.cut_short = false;
         let mut defined = terms.look(field.pattern(), x, precisely);
         let mut rows = terms.sizes.iter().zip(&self.start);
         if defined && !self.unasked.is_empty() && rows.any(|(d, unit)| *d < VANISHING * unit) {
@@ -231,36 +255,45 @@ impl Units {
             && vanishes
             && let Some(way) = self.way.take()
         {
-            self.ask_on_the_way(way, field, terms);
+            if !self.ask_on_the_way(&way, field, terms) {
+                // Another time: until then nothing is decided.
+                (self.way, self.cut_short) = (Some(way), true);
+            }
             defined = terms.look(field.pattern(), x, precisely);
+        }
+        self.cut_short |= terms.cut_short;
+        if defined {
+            self.hand_on(field.pattern(), &terms.sizes);
         }
         defined
     }
 
     /// A start may lie far off, or near a pole that is at zero, and no point that was asked say how large the rows are between: where their sizes lie level on the way, or rise again, and are a small
-    /// part of those known, they are the units.
+    /// part of those known, they are the units. False where the time is over before they are known.
     fn ask_on_the_way(
         &mut self,
-        [start, zero]: [Vec<f64>; 2],
+        [start, zero]: &[Vec<f64>; 2],
         field: &dyn Field,
         terms: &mut Terms,
-    ) {
+    ) -> bool {
         let n = start.len();
+        let mut over = false;
         let mut least = vec![f64::INFINITY; n + 1];
         let whole = [&self.own[..], &[self.largest.0]].concat();
         for inwards in [true, false] {
             let sign = if inwards { 1 } else { -1 };
             // Where nothing is between, away from zero itself.
             let from = if zero == start { vec![0.0; n] } else { zero.clone() };
-            if inwards && zero == start || start == from {
+            if inwards && zero == start || *start == from {
                 continue;
             }
             let mut before = whole.clone();
             let mut sizes_at = |k: i32, beyond: f64| {
                 let part = 2.0_f64.powi(-sign * k) * beyond;
                 let point: Vec<f64> =
-                    from.iter().zip(&start).map(|(z, s)| z + part * (s - z)).collect();
-                let asked = !budget::over()
+                    from.iter().zip(start).map(|(z, s)| z + part * (s - z)).collect();
+                over |= budget::over();
+                let asked = !over
                     && point.iter().all(|x| x.is_finite())
                     && tentatively(|| terms.look(field.pattern(), &point, !self.expressions));
                 let largest = terms.sizes.iter().fold(0.0_f64, |most, d| most.max(*d));
@@ -303,6 +336,9 @@ impl Units {
         }
         // These are no sizes of the point last looked at any more.
         terms.at.clear();
+        if over {
+            return false;
+        }
         let known = lesser(self.largest.0, self.largest.1);
         if least[n] < VANISHING * known {
             self.largest.1 = least[n];
@@ -312,6 +348,7 @@ impl Units {
                 self.level[i] = *least;
             }
         }
+        true
     }
 
     fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {
@@ -340,6 +377,19 @@ impl Units {
         let rows = self.elsewhere.iter_mut().zip(units).zip(&self.own);
         for ((unit, there), _) in rows.filter(|(_, own)| **own > 0.0) {
             *unit = lesser(*unit, there);
+        }
+    }
+
+    /// What neighbours of these sizes hand on to rows that vanish at the start. Those that are large at a start far off alone, or by terms that no variable within its bounds can balance, make
+    /// nothing small.
+    fn hand_on(&mut self, pattern: &Pattern, sizes: &[f64]) {
+        let Some((reach, jacobian)) = &self.handed else { return };
+        let rows = self.own.iter().zip(sizes);
+        let mut units: Vec<f64> =
+            rows.map(|(own, size)| if *own > 0.0 { *size } else { 0.0 }).collect();
+        hand_on(&mut units, pattern, jacobian, |j| reach[j]);
+        for (i, unit) in units.into_iter().enumerate().filter(|(i, _)| self.own[*i] == 0.0) {
+            self.elsewhere[i] = unit;
         }
     }
 

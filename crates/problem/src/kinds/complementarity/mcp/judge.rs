@@ -1,6 +1,8 @@
 //! The judge of nonlinear problems.
 
-use super::super::judge::{Pair, Terms, Units, finite, natural, put, share, verdict, worse};
+use super::super::judge::{
+    NEVER, Pair, Terms, Units, finite, natural, put, reach, share, verdict, worse,
+};
 use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
@@ -10,7 +12,7 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 ///
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
 /// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|` (where F does not change as J says, `|F_i|` and its change along a vector of the size of x, if that is smaller); of rows that vanish with all their terms at least
-/// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share; or
+/// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share, as far as those reach (the smaller modulus of a variable's bounds that is not zero) and no more than the other rows' sizes at x make of it; or
 /// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller; where a row is smaller than that ten-thousandth, also the size on the way to these points where it no longer falls, if that is a smaller
 /// part: a start far off, or near a pole at zero, makes nothing small. Of a row that along a change of x by a
 /// thousandth does not change as J says, that change counts in place of the terms that it should have had. That a variable is d away from a bound
@@ -47,10 +49,12 @@ impl McpGauge {
     pub(super) fn new(problem: &Mcp) -> Self {
         let n = problem.dim();
         let start = problem.origin().z;
-        let zero = problem.lower.iter().zip(&problem.upper).map(|(l, u)| 0.0_f64.max(*l).min(*u));
+        let bounds = || problem.lower.iter().zip(&problem.upper);
+        let zero = bounds().map(|(l, u)| 0.0_f64.max(*l).min(*u)).collect();
+        let reach = start.iter().zip(bounds()).map(|(s, (l, u))| reach(*s, *l, *u)).collect();
         let mut terms = Terms::new(&*problem.F);
         Self {
-            units: Units::new(&*problem.F, &mut terms, &start, zero.collect()),
+            units: Units::new(&*problem.F, &mut terms, &start, zero, reach),
             terms,
             scales: vec![0.0; n],
             lengths: start.iter().map(|s| s.abs()).collect(),
@@ -130,14 +134,16 @@ impl McpGauge {
                 share_of_own = if length > 0.0 { share_of_own.min(way) } else { 0.0 };
             } else if near > 0.0 && near < unit {
                 // What no double near x does better is no error.
-                let beyond = (pair.w.abs() - 4.0 * self.rounding(problem, x, i)).max(0.0);
+                let rounding = self.terms.rounding(problem.F.pattern(), x, i);
+                let beyond = (pair.w.abs() - 4.0 * rounding).max(0.0);
                 share_of_own = share_of_own.max(share(beyond, near));
             }
             if share_of_own > own {
                 (own, measure.own_contact) = (share_of_own, Some(i));
             }
         }
-        measure.own = Some(own);
+        // What is not known cannot be held against the point, nor the point be accepted without it.
+        measure.own = Some(if precisely && self.units.cut_short { NEVER } else { own });
         measure.relative = worse(worse(measure.primal, measure.dual), measure.complementarity);
         (measure.literature, measure.siconos) = (measure.absolute, measure.absolute);
         measure.floor = precisely.then(|| self.floor(problem, x));
@@ -155,14 +161,8 @@ impl McpGauge {
     /// The largest error that a change of all variables by half their last bit makes.
     fn floor(&self, problem: &Mcp, x: &[f64]) -> f64 {
         let scaled = self.scales.iter().enumerate().filter(|(_, d)| **d > 0.0);
-        scaled.fold(0.0, |most, (i, d)| most.max(self.rounding(problem, x, i) / d))
-    }
-
-    /// What such a change makes of `F_i`.
-    fn rounding(&self, problem: &Mcp, x: &[f64], i: usize) -> f64 {
-        let pattern = problem.F.pattern();
-        let terms = self.terms.jacobian[pattern.range(i)].iter().zip(pattern.row(i));
-        0.5 * f64::EPSILON * terms.map(|(a, &j)| (a * x[j]).abs()).sum::<f64>()
+        let rounding = |i: usize| self.terms.rounding(problem.F.pattern(), x, i);
+        scaled.fold(0.0, |most, (i, d)| most.max(rounding(i) / d))
     }
 
     pub(super) fn tidy(&self, problem: &Mcp, point: &mut LcpPoint, boldly: bool) -> bool {

@@ -327,3 +327,76 @@ fn a_point_is_asked_once() {
     assert_eq!(problem.certify(&point, &mut gauge).relative, certified.relative);
     assert_eq!(asked.load(Ordering::Relaxed) - before, 7);
 }
+
+/// A row that vanishes at the start has a unit of its neighbours', as far as the variables that they share reach, and no larger than they are elsewhere.
+#[test]
+fn what_no_variable_reaches_is_no_unit() {
+    /// F, bounds of x2 (x1 is free), start, a point that is none, one that is.
+    type Case = ([&'static str; 2], [f64; 2], [f64; 2], [f64; 2], Option<[f64; 2]>);
+    let inf = f64::INFINITY;
+    let all: [Case; 7] = [
+        (["x2", "1e14 + x1^2 - x2"], [-1.0, 1.0], [0.0; 2], [0.0, -1.0], None),
+        (["x2", "1e14 + x1^2 - x2"], [-1.0, inf], [0.0; 2], [0.0, -1.0], None),
+        (["x2", "1e14 + 0.001*x1 - x2"], [-1.0, 1.0], [0.0; 2], [0.0, -1.0], Some([-1e17, 0.0])),
+        (["x2", "x1^2 - x2 + 2"], [-1.0, 1.0], [1e7, 0.0], [0.0, -1.0], None),
+        (["x2", "x1^2 - x2 + 2"], [-inf, inf], [1e7, 0.0], [0.0, 2.0], None),
+        (
+            ["x2", "x1^2 - x2 - 2"],
+            [-inf, inf],
+            [1e7, 0.0],
+            [0.0, -2.0],
+            Some([2_f64.sqrt(), 4e-16]),
+        ),
+        (["-x2", "exp(x1) - x2 - 1"], [-inf, 0.0], [100.0, 0.0], [-30.0, -1.0], Some([0.0, 0.0])),
+    ];
+    for (f, [lower, upper], start, wrong, right) in all {
+        let field = Expressions::parse(&f.map(String::from), &[]).unwrap();
+        let problem = Mcp::new(field, vec![-inf, lower], vec![inf, upper], start.to_vec()).unwrap();
+        let judged = |z: [f64; 2]| problem.judge(&LcpPoint { z: z.to_vec() }, 1e-8).unwrap();
+        let verdict = judged(wrong);
+        assert!(!verdict.solved, "{f:?} at {wrong:?}: {:?}", verdict.measure);
+        if let Some(right) = right {
+            let verdict = judged(right);
+            assert!(verdict.solved, "{f:?} at {right:?}: {:?}", verdict.measure);
+        }
+    }
+}
+
+/// A limit of time that is over leaves nothing out of what decides.
+#[test]
+fn the_time_makes_no_error_small() {
+    use nonsmooth_linalg::budget::Budget;
+    let late = || Budget { deadline: Some(std::time::Instant::now()), ..Budget::default() };
+    let inf = f64::INFINITY;
+    // The Jacobian makes its terms large, of plain arithmetic 1/∞ is zero, and of a start near a pole the units are on the way.
+    let expression = |f: &str, lower: f64, upper: f64, start: f64| {
+        let field = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
+        Mcp::new(field, vec![lower], vec![upper], vec![start]).unwrap()
+    };
+    let field = closures(|x| x - 8.0, |_| 1e12);
+    let of_functions = Mcp::new(field, vec![-inf; 2], vec![inf; 2], vec![1.0; 2]).unwrap();
+    for (problem, x) in [
+        (of_functions, 1.0),
+        (expression("1/(1 + 1/x)", -1.0, 1.0, 0.0), 0.0),
+        (expression("x^2 - 10/x^2", 1e-12, inf, 1e-12), 0.0658),
+    ] {
+        let point = LcpPoint { z: vec![x; problem.dim()] };
+        for early in [true, false] {
+            let mut gauge = problem.gauge().unwrap();
+            if early {
+                let _ = problem.measure(&point, &mut gauge);
+            }
+            let scope = late().enter();
+            let _ = problem.measure(&point, &mut gauge);
+            assert!(!problem.certify(&point, &mut gauge).passes(1e-8), "{problem:?}");
+            drop(scope);
+            assert!(!problem.certify(&point, &mut gauge).passes(1e-8), "{problem:?}");
+        }
+    }
+    // And what is a solution is one.
+    let problem = expression("x^2 - 2", -inf, inf, 1.0);
+    let mut gauge = problem.gauge().unwrap();
+    let _scope = late().enter();
+    let point = LcpPoint { z: vec![2_f64.sqrt()] };
+    assert!(problem.certify(&point, &mut gauge).passes(1e-8));
+}

@@ -89,10 +89,31 @@ impl Dynamics {
         r: &[f64],
         refine: Refine,
     ) -> (&[f64], &[f64]) {
-        let n = problem.dofs();
-        let (v, constraints) = self.state.split_at_mut(n);
+        let v = &mut self.state[..problem.dofs()];
         v.copy_from_slice(&problem.f);
         problem.H.mul_add(1.0, r, v);
+        self.solve_state(problem, refine)
+    }
+
+    /// [`solve`](Self::solve) for the impulses r of which `load = H r + f`.
+    pub(super) fn solve_under<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionGlobal<D, L>,
+        load: impl Iterator<Item = f64>,
+        refine: Refine,
+    ) -> (&[f64], &[f64]) {
+        self.state[..problem.dofs()].iter_mut().zip(load).for_each(|(v, load)| *v = load);
+        self.solve_state(problem, refine)
+    }
+
+    /// The same, where the state is `H r + f` already.
+    fn solve_state<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionGlobal<D, L>,
+        refine: Refine,
+    ) -> (&[f64], &[f64]) {
+        let n = problem.dofs();
+        let (v, constraints) = self.state.split_at_mut(n);
         match (&problem.rows, &self.held) {
             (None, _) => {}
             (Some(b), None) => constraints.iter_mut().zip(&b.b).for_each(|(o, b)| *o = -b),
@@ -123,19 +144,37 @@ impl Dynamics {
         r: &[f64],
         [high, low, last]: [&mut [f64]; 3],
     ) {
-        // H r + f and −b, each one sum in doubled precision.
-        let (n, dim) = (problem.dofs(), self.inverse.dim());
+        let n = problem.dofs();
         high[..n].copy_from_slice(&problem.f);
         low.fill(0.0);
-        let mut add = |i: usize, a: f64, x: f64| {
-            let mut sum = Compensated::parts(high[i], low[i]);
-            sum.add_product(a, x);
-            (high[i], low[i]) = sum.into_parts();
-        };
         for (j, &rj) in r.iter().enumerate() {
             let (rows, values) = problem.H.column(j);
-            rows.iter().zip(values).for_each(|(&i, &v)| add(i, v, rj));
+            rows.iter().zip(values).for_each(|(&i, &v)| add_product((high, low), i, v, rj));
         }
+        self.solve_parts(problem, [high, low, last]);
+    }
+
+    /// [`solve_doubled`](Self::solve_doubled) for the impulses r of which `load = H r + f`, a sum and what it has lost.
+    pub(super) fn solve_doubled_under<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionGlobal<D, L>,
+        load: impl Iterator<Item = (f64, f64)>,
+        [high, low, last]: [&mut [f64]; 3],
+    ) {
+        low.fill(0.0);
+        for (i, load) in load.enumerate() {
+            (high[i], low[i]) = load;
+        }
+        self.solve_parts(problem, [high, low, last]);
+    }
+
+    /// The same, where `high + low` are `H r + f` already.
+    fn solve_parts<const D: usize, L: Law<D>>(
+        &mut self,
+        problem: &FrictionGlobal<D, L>,
+        [high, low, last]: [&mut [f64]; 3],
+    ) {
+        let (n, dim) = (problem.dofs(), self.inverse.dim());
         let Some(held) = &self.held else {
             let b = problem.rows.iter().flat_map(|b| &b.b);
             high[n..].iter_mut().zip(b).for_each(|(high, b)| *high = -b);
@@ -144,7 +183,9 @@ impl Dynamics {
         let rows = problem.rows.iter();
         for (b, j) in rows.clone().flat_map(|b| b.bounds.bounded().map(move |j| (b, j))) {
             let (rows, values) = b.G.column(j);
-            rows.iter().zip(values).for_each(|(&i, &g)| add(i, g, held.lambda[j]));
+            rows.iter()
+                .zip(values)
+                .for_each(|(&i, &g)| add_product((high, low), i, g, held.lambda[j]));
         }
         for b in rows {
             high[n..dim].iter_mut().zip(&held.free).for_each(|(high, &j)| *high = -b.b[j]);
@@ -237,4 +278,11 @@ impl Dynamics {
         let r = vec![0.0; problem.w.len()];
         Impulses::toward(r, multipliers, &[], &b.b, |c| judge::holds(problem, c))
     }
+}
+
+/// Adds `a x` to entry i of `high + low`, its rounding error included.
+fn add_product((high, low): (&mut [f64], &mut [f64]), i: usize, a: f64, x: f64) {
+    let mut sum = Compensated::parts(high[i], low[i]);
+    sum.add_product(a, x);
+    (high[i], low[i]) = sum.into_parts();
 }

@@ -8,7 +8,7 @@ use crate::check::{
 };
 use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::gauge::{
-    Care, HALF_ULP, LawGauge, STEERING, largest, unit, worst,
+    Care, HALF_ULP, LawGauge, STEERING, felt, largest, trace, unit, worst,
 };
 use crate::kinds::contact::judge::loads::ROUNDING;
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
@@ -38,6 +38,8 @@ pub struct GlobalGauge {
     /// The units of the velocities of contacts, constraints and motions.
     units: Vec<f64>,
     rows: Rows,
+    /// `H r + f` of the point that is measured.
+    load: Rows,
 }
 
 /// The judge's own v and λ: high and low parts, what is not known of them, and room for more.
@@ -57,11 +59,15 @@ struct Reach {
     /// Contacts of large components, whose inverse is not known by entries, by component.
     large: Vec<Vec<usize>>,
     sizes: Vec<f64>,
+    /// `|f| + |H||r| + |G||λ|`.
     load: Vec<f64>,
 }
 
-/// The mean diagonal of a block W_cc that is rounding, over its largest entry.
-const NOISE: f64 = 1e-12;
+/// A velocity q without impulses below this part of its terms may be rounding.
+const SMALL_REST: f64 = 1e-12;
+
+/// One below this part of them is that of doubled precision.
+const NO_REST: f64 = 1e-26;
 
 /// A last correction of this size, over that of the largest velocity, is below all that is compared.
 const KNOWN: f64 = 1e-24;
@@ -103,26 +109,20 @@ impl Reach {
         reach
     }
 
-    /// The sizes of the terms of each velocity for the impulses r and the multipliers.
+    /// The sizes of the terms of each velocity for the impulses r and the multipliers; `loads` are those of `H r + f`.
     fn update<const D: usize, L: Law<D>>(
         &mut self,
         problem: &FrictionGlobal<D, L>,
         w: &[f64],
-        r: &[f64],
+        (r, loads): (&[f64], &[f64]),
         (v, lambda): (&[f64], &[f64]),
         spare: &mut [f64],
     ) {
         let Self { small, large, sizes, load } = self;
-        load.iter_mut().zip(&problem.f).for_each(|(load, f)| *load = f.abs());
-        let mut add = |a: &Csc, x: &[f64]| {
-            for (j, xj) in x.iter().enumerate() {
-                let (rows, values) = a.column(j);
-                rows.iter().zip(values).for_each(|(&i, v)| load[i] += (v * xj).abs());
-            }
-        };
-        add(&problem.H, r);
-        if let Some(b) = &problem.rows {
-            add(&b.G, lambda);
+        load.copy_from_slice(loads);
+        for (b, j) in problem.rows.iter().flat_map(|b| (0..lambda.len()).map(move |j| (b, j))) {
+            let (rows, values) = b.G.column(j);
+            rows.iter().zip(values).for_each(|(&i, g)| load[i] += (g * lambda[j]).abs());
         }
         // Of a large component at least what comes of it.
         spare.copy_from_slice(v);
@@ -165,11 +165,7 @@ impl GlobalGauge {
         let (m, n) = (problem.w.len(), problem.dofs() + problem.multipliers());
         let zeros = vec![0.0; n];
         let mut gauge = Self {
-            law: LawGauge::new(diagonal.iter().map(|block| {
-                // A trace of rounding is none: of skew M the diagonal of W is zero.
-                let mean = small::mean_diagonal(block);
-                if mean.abs() > NOISE * largest(block) { mean } else { 0.0 }
-            })),
+            law: LawGauge::new(diagonal.iter().map(trace)),
             reach: Reach::new::<D>(&problem.H, inverse),
             dynamics,
             free,
@@ -186,13 +182,15 @@ impl GlobalGauge {
             buffer: vec![0.0; problem.dofs()],
             units: vec![],
             rows: Rows::default(),
+            load: Rows::default(),
         };
         gauge.law.strength = diagonal.iter().map(largest).collect();
         gauge.couple(problem);
         gauge.rescale(problem);
         // The longest use of the rows, so that a measurement allocates nothing.
         let longest = problem.dofs().max(problem.w.len()).max(problem.multipliers());
-        gauge.rows.start(&vec![0.0; longest]);
+        gauge.rows.start_at_zero(longest);
+        gauge.load.start_at_zero(problem.dofs());
         Ok(gauge)
     }
 
@@ -232,6 +230,18 @@ impl GlobalGauge {
         rows.add_transposed(&problem.H, &low[..n]);
         q.iter_mut().zip(rows.values()).for_each(|(q, x)| *q = x);
         law.norm_q = norm(q);
+        let terms = norm(rows.sizes());
+        if law.norm_q <= SMALL_REST * terms {
+            // Of a q that is zero the sum leaves its rounding, and what is not known of v.
+            let unknown = (0..q.len()).map(|i| {
+                let (at, values) = problem.H.column(i);
+                at.iter().zip(values).map(|(&j, h)| (h * last[j]).abs()).sum::<f64>()
+            });
+            if law.norm_q <= NO_REST * terms + norm_of(unknown) {
+                q.fill(0.0);
+                law.norm_q = 0.0;
+            }
+        }
         let motion = problem.contacts() + problem.multipliers();
         let violations = problem.rows.iter().flat_map(|b| {
             // An impulse that has to be there is a load too.
@@ -284,21 +294,22 @@ impl GlobalGauge {
         point: &GlobalPoint,
         precisely: bool,
     ) -> Measure {
-        let Self { law, dynamics, free, reach, u, exact, own: state, buffer, rows, .. } = self;
+        let Self { law, dynamics, free, reach, u, exact, own: state, buffer, rows, load, .. } =
+            self;
         let n = problem.dofs();
-        // A size needs no more digits.
-        rows.precisely(false);
-        rows.start_at_zero(n);
-        rows.add(1.0, &problem.H, &point.r);
-        let force = norm(&problem.f).max(rows.norm());
-        rows.precisely(precisely);
+        load.precisely(precisely);
+        load.start(&problem.f);
+        load.add(1.0, &problem.H, &point.r);
+        // ‖H r‖ but for rounding, which matters where it is smaller than ‖f‖ alone.
+        let of_impulses = load.values().zip(&problem.f).map(|(load, f)| load - f);
+        let force = norm(&problem.f).max(norm_of(of_impulses));
         dynamics.hold(&point.lambda);
-        let given = imbalance(problem, (&point.v, &[]), &point.r, &point.lambda, force, rows);
+        let given = imbalance(problem, (&point.v, &[]), &point.lambda, force, (load, rows));
         let State { high, low, last, spare } = state;
         if precisely {
-            dynamics.solve_doubled(problem, &point.r, [high, low, last]);
+            dynamics.solve_doubled_under(problem, load.parts(), [high, low, last]);
         } else {
-            let (v, lambda) = dynamics.solve(problem, &point.r, Refine::Fully);
+            let (v, lambda) = dynamics.solve_under(problem, load.values(), Refine::Fully);
             high[..n].copy_from_slice(v);
             high[n..].copy_from_slice(lambda);
             low.fill(0.0);
@@ -310,7 +321,7 @@ impl GlobalGauge {
         let own = if known {
             Imbalance { residual: 0.0, ..given }
         } else {
-            imbalance(problem, (v, v_low), &point.r, lambda, force, rows)
+            imbalance(problem, (v, v_low), lambda, force, (load, rows))
         };
         let bounded = problem.rows.as_ref().filter(|b| !b.bounds.are_free());
         if let (Some(b), Some((free, scratch))) = (bounded, free) {
@@ -325,7 +336,8 @@ impl GlobalGauge {
         rows.start(&problem.w);
         rows.add_transposed(&problem.H, v);
         let mut measure = if precisely {
-            reach.update(problem, &law.w, &point.r, (v, lambda), &mut spare[..n]);
+            let of_r = (&point.r[..], load.sizes());
+            reach.update(problem, &law.w, of_r, (v, lambda), &mut spare[..n]);
             rows.add_transposed(&problem.H, v_low);
             exact.iter_mut().zip(rows.doubled()).for_each(|(u, x)| *u = x);
             u.iter_mut().zip(rows.values()).for_each(|(u, x)| *u = x);
@@ -353,7 +365,9 @@ impl GlobalGauge {
             *gap = if missing.abs() <= ROUNDING * v[i].abs() { 0.0 } else { missing };
         }
         rows.start_at_zero(problem.w.len());
-        rows.add_transposed(&problem.H, buffer);
+        if buffer.iter().any(|gap| *gap != 0.0) {
+            rows.add_transposed(&problem.H, buffer);
+        }
         measure.velocity_gap = Some(over(rows.norm(), law.norm_q));
 
         if let Some(b) = &problem.rows {
@@ -439,8 +453,11 @@ fn floor<const D: usize, L: Law<D>>(
         *signed = if hash >> 63 == 0 { *r } else { -r };
     }
     let response = dynamics.respond(problem, signed, Refine::Once);
-    let of_column = |i: usize| problem.H.column_dot(i, response);
-    HALF_ULP * norm_of((0..problem.w.len()).map(of_column)) / law.unit()
+    let of_contact = |c: usize| {
+        let felt = felt::<L, D>(problem.law(c), &small::block(r, c));
+        (0..D).map(move |k| problem.H.column_dot(D * c + k, response) * felt[k].sqrt())
+    };
+    HALF_ULP * norm_of((0..problem.contacts()).flat_map(of_contact)) / law.unit()
 }
 
 /// The residual of the dynamics and what of it the rounding of v explains.
@@ -449,17 +466,15 @@ struct Imbalance {
     rounding: f64,
 }
 
-/// `‖M v − H r − f − G λ‖` over `force = max(‖f‖, ‖H r‖)`; v may have a low part.
+/// `‖M v − H r − f − G λ‖` over `force = max(‖f‖, ‖H r‖)`, of `load = H r + f`; v may have a low part.
 fn imbalance<const D: usize, L: Law<D>>(
     problem: &FrictionGlobal<D, L>,
     (v, v_low): (&[f64], &[f64]),
-    r: &[f64],
     lambda: &[f64],
     force: f64,
-    rows: &mut Rows,
+    (load, rows): (&Rows, &mut Rows),
 ) -> Imbalance {
-    rows.start(&problem.f);
-    rows.add(1.0, &problem.H, r);
+    rows.start_from(load);
     if let Some(b) = &problem.rows {
         rows.add(1.0, &b.G, lambda);
     }

@@ -30,6 +30,9 @@ pub struct ContactStatus {
     /// Pressed and rolling against rolling friction: `u_R ≠ 0`, the moment on the boundary of its disk. Never without rolling friction.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub rolls: bool,
+    /// Pressed and not rolling, with the moment on the boundary of its disk. Never without rolling friction.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub at_rolling_limit: bool,
 }
 
 /// `‖x_T‖` of `[x_N, x_T…]`.
@@ -87,8 +90,8 @@ pub trait Law<const D: usize>: Copy + std::fmt::Debug + PartialEq + Send + Sync 
     /// `dist(ũ, K*)`, from u.
     fn distance_to_dual(self, u: &[f64; D]) -> f64;
 
-    /// What the square of that distance is multiplied by where K* is nearly the whole space, and velocities into the obstacle are near it.
-    fn opening(self) -> f64;
+    /// The law with coefficients of at most 1. By its K* velocities into the obstacle are measured: with more friction K* is nearly the whole space, and any of them near it.
+    fn softened(self) -> Self;
 
     /// Whether `x − ũ`, which plain arithmetic knows up to `error`, surely lies in K or in its polar cone, so that the natural map is ũ or x itself and no difference.
     fn is_at_rest_or_open(self, x: &[f64; D], modified: &[f64; D], error: f64) -> bool;
@@ -185,11 +188,9 @@ impl<const D: usize> Law<D> for Coulomb {
         }
     }
 
-    /// With mu > 1 a velocity is as far from K* as with mu = 1.
     #[inline(always)]
-    fn opening(self) -> f64 {
-        let mu = self.mu;
-        ((1.0 + mu * mu) / (1.0 + mu.min(1.0).powi(2))).min(f64::MAX)
+    fn softened(self) -> Self {
+        Self { mu: self.mu.min(1.0) }
     }
 
     #[inline(always)]
@@ -241,6 +242,7 @@ impl<const D: usize> Law<D> for Coulomb {
             at_limit: status == Motion::Stick && (near_boundary || into_cone < 0.0),
             degenerate: into_polar.abs() <= margin || near_boundary,
             rolls: false,
+            at_rolling_limit: false,
         }
     }
 }
@@ -251,7 +253,7 @@ pub(crate) struct Share {
     pub residual: f64,
     /// `dist(x, K)²`.
     pub primal: f64,
-    /// `dist(ũ, K*)²` times the law's [opening](Law::opening).
+    /// `dist(ũ, K*)²` of the [softened](Law::softened) law.
     pub dual: f64,
     /// `|x · ũ|`.
     pub complementarity: f64,
@@ -270,7 +272,7 @@ impl Share {
         Self {
             residual: square(law.natural_map(x, modified)),
             primal: law.distance_to_cone(x).powi(2),
-            dual: law.opening() * law.distance_to_dual(&u.map(|v| v.value())).powi(2),
+            dual: law.softened().distance_to_dual(&u.map(|v| v.value())).powi(2),
             complementarity: products.fold(T::from(0.0), |sum, p| sum + p).value().abs(),
         }
     }
@@ -323,7 +325,8 @@ mod tests {
                 status: Motion::Slip,
                 at_limit: false,
                 degenerate: false,
-                rolls: false
+                rolls: false,
+                at_rolling_limit: false
             }
         );
         let open = Coulomb { mu: 0.0 }.status(&[0.0; 3], &[1.0, 5.0, 0.0], 1e-9);
@@ -333,7 +336,8 @@ mod tests {
                 status: Motion::Open,
                 at_limit: false,
                 degenerate: false,
-                rolls: false
+                rolls: false,
+                at_rolling_limit: false
             }
         );
     }

@@ -39,6 +39,31 @@ pub(crate) fn largest<const D: usize>(block: &[[f64; D]; D]) -> f64 {
     block.iter().flatten().fold(0.0, |l, x| l.max(x.abs()))
 }
 
+/// The mean diagonal of a block W_cc that is rounding, over its largest entry; of all blocks, over the mean of the moduli.
+const NOISE: f64 = 1e-12;
+
+/// `w_c`, the mean diagonal of W_cc; zero where that is a trace of rounding, as of a skew matrix.
+#[inline]
+pub(crate) fn trace<const D: usize>(block: &[[f64; D]; D]) -> f64 {
+    let mean = small::mean_diagonal(block);
+    if mean.abs() > NOISE * largest(block) { mean } else { 0.0 }
+}
+
+/// A contact whose impulse is below this part of what friction can hold sticks for certain.
+const STICKS: f64 = 0.999;
+
+/// What the square of the rounding of each entry of u counts in that of ũ, for the impulse `r` of the contact: as it is, and where it sticks those of a disk also the square of its coefficient, by which they
+/// come back in ũ_N. Of what slides or is open the natural map feels ũ_N no more.
+pub(crate) fn felt<L: Law<D>, const D: usize>(law: L, r: &[f64; D]) -> [f64; D] {
+    let rows = (D - 1) / L::DISKS;
+    std::array::from_fn(|k| {
+        let Some(disk) = k.checked_sub(1).map(|k| k / rows) else { return 1.0 };
+        let coefficient = law.coefficient(disk);
+        let sticks = norm(&r[1 + disk * rows..][..rows]) < STICKS * coefficient * r[0];
+        if sticks { 1.0 + coefficient * coefficient } else { 1.0 }
+    })
+}
+
 /// What a measurement that decides knows of the velocities that it is given.
 pub(crate) struct Care<'a, F> {
     /// The sizes of the terms of each entry.
@@ -86,8 +111,8 @@ impl LawGauge {
         self.with_rows = None;
         self.w.clear();
         self.w.extend(diagonal);
-        let mean = self.w.iter().sum::<f64>() / self.w.len().max(1) as f64;
-        let stand_in = if mean > 0.0 { mean } else { 1.0 };
+        let (sum, moduli) = self.w.iter().fold((0.0, 0.0), |(s, m), w| (s + w, m + w.abs()));
+        let stand_in = if sum > NOISE * moduli { sum / self.w.len() as f64 } else { 1.0 };
         for w in &mut self.w {
             if *w <= 0.0 {
                 *w = stand_in;
@@ -165,7 +190,7 @@ impl LawGauge {
         doubt: f64,
         sizes: &[f64],
     ) -> f64 {
-        let steepest = laws.map(|law| law.opening().sqrt() * law.growth()).fold(0.0, f64::max);
+        let steepest = laws.map(|law| law.softened().growth()).fold(0.0, f64::max);
         over(steepest * doubt * norm(sizes), self.norm_q)
     }
 

@@ -146,9 +146,8 @@ impl<const D: usize> Law<D> for Rolling {
         }
     }
 
-    fn opening(self) -> f64 {
-        let least = 1.0 + self.mu.min(1.0).powi(2) + self.mu_r.min(1.0).powi(2);
-        (self.secant().powi(2) / least).min(f64::MAX)
+    fn softened(self) -> Self {
+        Self { mu: self.mu.min(1.0), mu_r: self.mu_r.min(1.0) }
     }
 
     fn is_at_rest_or_open(self, x: &[f64; D], modified: &[f64; D], error: f64) -> bool {
@@ -194,11 +193,13 @@ impl<const D: usize> Law<D> for Rolling {
         };
         let near =
             |disk: usize| Law::<D>::coefficient(self, disk) > 0.0 && into[disk].abs() <= margin;
+        let resists = status != Motion::Open && self.mu_r > 0.0;
         ContactStatus {
             status,
             at_limit: status == Motion::Stick && (near(0) || into[0] < 0.0),
             degenerate: into_polar.abs() <= margin || near(0) || near(1),
-            rolls: status != Motion::Open && self.mu_r > 0.0 && !rests(1),
+            rolls: resists && !rests(1),
+            at_rolling_limit: resists && rests(1) && (near(1) || into[1] < 0.0),
         }
     }
 }

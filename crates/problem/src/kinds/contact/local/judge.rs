@@ -8,7 +8,7 @@ use crate::check::{
 };
 use crate::kinds::contact::judge::Weighed;
 use crate::kinds::contact::judge::gauge::{
-    Care, HALF_ULP, LawGauge, STEERING, largest, unit, worst,
+    Care, HALF_ULP, LawGauge, STEERING, felt, largest, trace, unit, worst,
 };
 use crate::kinds::contact::judge::statement::{contacts, opposite, under};
 use crate::kinds::contact::judge::weighed::{
@@ -47,7 +47,7 @@ impl LocalGauge {
 
     pub(crate) fn refill<const D: usize, L: Law<D>>(&mut self, problem: &FrictionLocal<D, L>) {
         let contacts = problem.contacts();
-        let diagonal = (0..contacts).map(|c| small::mean_diagonal(&problem.W.diagonal_block(c)));
+        let diagonal = (0..contacts).map(|c| trace(&problem.W.diagonal_block(c)));
         self.law.refill(diagonal, norm(&problem.q));
         self.mark_loads(problem);
         if let Some(rows) = &problem.rows {
@@ -348,7 +348,12 @@ impl LocalGauge {
         each_term(problem.rows.as_ref().map(|b| &b.V), &point.lambda, |i, a, x| {
             squares[i] += (a * x * per).powi(2);
         });
-        let spread = squares.iter().sum::<f64>().sqrt() * (unit / self.law.unit());
+        let of_contact = |(c, squares): (usize, &[f64])| {
+            let felt = felt::<L, D>(problem.law(c), &small::block(&point.r, c));
+            squares.iter().zip(felt).map(|(square, felt)| square * felt).sum::<f64>()
+        };
+        let all = squares.chunks_exact(D).enumerate().map(of_contact).sum::<f64>();
+        let spread = all.sqrt() * (unit / self.law.unit());
         squares.iter_mut().zip(&self.exact).for_each(|(u, x)| *u = x.value());
         HALF_ULP * spread
     }

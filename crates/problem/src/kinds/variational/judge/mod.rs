@@ -10,7 +10,9 @@ use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, Verdict};
 use crate::field::tentatively;
-use crate::kinds::complementarity::judge::{Terms, Units, lesser, natural, to_the_edge};
+use crate::kinds::complementarity::judge::{
+    NEVER, Terms, Units, lesser, natural, reach, to_the_edge,
+};
 pub(super) use projection::Projection;
 
 /// Where x is with respect to a constraint of the set: a bounded variable of a box, an inequality of a polyhedron, a ball, a cone.
@@ -46,7 +48,7 @@ pub struct SetCounts {
 /// | `primal` | how far x violates a constraint: of a bound, a half-space, a ball the distance from it, of a cone `(‖x̄‖ − x_1)/√2`; the largest over ξ |
 /// | `dual`, `relative` | `‖r‖_∞ / ξ`, and what the projection violates added; **decides** |
 /// | `complementarity` | `|F(x)ᵀ r| / (n φ ξ)` |
-/// | `own` | the same residual of each part of the set (each variable of a box, the variables that rows of a polyhedron join) by itself, with the φ of its rows at the start or at zero, the smaller: x that runs away, or larger rows, excuse nothing |
+/// | `own` | the same residual of each part of the set (each variable of a box, the variables that rows of a polyhedron join) by itself, with the φ of its rows at the start or at zero, the smaller: x that runs away, or larger rows, excuse nothing. Where x is inside of all that joins a variable to others, by a thousandth of ξ, also `|F_i|` (but for what the last bits of x make of it) over the φ of that row alone |
 /// | `absolute`, `literature`, `siconos` | `‖x − P_X(x − F(x))‖_∞` |
 ///
 /// The projections are the judge's own: of cones in the half-plane of the axis and the norm of the rest, of polyhedra by nonnegative least squares
@@ -73,6 +75,8 @@ pub struct ViGauge {
     length: Length,
     /// How they count at the point last looked at.
     known: Known,
+    /// The time was over before all was known that this point is to be measured by.
+    cut_short: bool,
     /// γ of each variable.
     gammas: Vec<f64>,
 }
@@ -116,6 +120,9 @@ impl Known {
 /// A residual below which each part is looked at by itself.
 const LOOKED_AT: f64 = 1e-3;
 
+/// So far from the border, in parts of the size of x, a point is inside.
+const INSIDE: f64 = 1e-3;
+
 /// The part of the size of the start and the set that each part of x has at least.
 const OF_OTHERS: f64 = 1e-4;
 /// A start or a set that is so many times as large as all else is far off.
@@ -142,7 +149,7 @@ impl ViGauge {
             }
         }
         Self {
-            units: Units::new(&*problem.F, &mut terms, &problem.start, zeros()),
+            units: Units::new(&*problem.F, &mut terms, &problem.start, zeros(), reaches(problem)),
             terms,
             from: zeros(),
             y: zeros(),
@@ -156,15 +163,18 @@ impl ViGauge {
             start,
             length: Length::NotAsked,
             known: Known::default(),
+            cut_short: false,
             gammas: zeros(),
         }
     }
 
     /// F at x, and φ. `None` where F is not defined.
     fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
+        self.cut_short = false;
         self.known = self.count(problem, largest(x));
-        let Self { terms, units, .. } = self;
+        let Self { terms, units, cut_short, .. } = self;
         let defined = units.look(&*problem.F, terms, x, precisely);
+        *cut_short |= units.cut_short;
         defined.then(|| largest(&terms.sizes).max(units.least_of_all()))
     }
 
@@ -177,7 +187,11 @@ impl ViGauge {
             return all;
         }
         if self.length == Length::NotAsked {
-            self.length = self.length_of(problem);
+            match self.length_of(problem) {
+                Some(length) => self.length = length,
+                // Another time: until then nothing is decided.
+                None => self.cut_short = true,
+            }
         }
         let Length::Known(length) = self.length else { return all };
         let base = size.max(length);
@@ -190,8 +204,9 @@ impl ViGauge {
         Known { start, set: if is_far(set, near) { near } else { set } }
     }
 
-    /// The size of F's terms near zero over their slopes.
-    fn length_of(&mut self, problem: &Vi) -> Length {
+    /// The size of F's terms near zero over their slopes. `None` where the time is over.
+    fn length_of(&mut self, problem: &Vi) -> Option<Length> {
+        let mut over = false;
         let Self { terms, start, size_of_start, .. } = self;
         let pattern = problem.F.pattern();
         let at_zero = problem.F.expressions().is_some() || *size_of_start == 0.0;
@@ -199,8 +214,9 @@ impl ViGauge {
         let parts = if at_zero { &[0.0][..] } else { &parts };
         let mut length_at = |part: f64| {
             let near: Vec<f64> = start.iter().map(|s| part * s).collect();
-            if budget::over() || !tentatively(|| terms.look(pattern, &near, false)) || !terms.smooth
-            {
+            over |= budget::over();
+            let asked = !over && tentatively(|| terms.look(pattern, &near, false));
+            if !asked || !terms.smooth {
                 return None;
             }
             Some(terms.sizes.iter().enumerate().fold(0.0_f64, |length, (i, d)| {
@@ -231,7 +247,7 @@ impl ViGauge {
                 })
             });
         }
-        found
+        (!over).then_some(found)
     }
 
     /// `‖x − P_X(x − γ F)‖_∞` with what the projection violates, for F as it was looked at and the γ of each variable; the projection is left in y, the difference in `moved`.
@@ -300,11 +316,25 @@ impl ViGauge {
                 (sizes[i], self.gammas[i]) = scaled(size, phi(i));
             }
         }
+        let mut alone = 0.0_f64;
+        let near = INSIDE * largest(x).max(known.size());
+        let pattern = problem.F.pattern();
+        for (first, set) in problem.set.parts() {
+            let held = held_near(set, &x[first..first + set.dim()], near);
+            // There the condition is F = 0, row by row, whatever the others are as large as.
+            for i in (first..).zip(held).filter(|(_, held)| !held).map(|(i, _)| i) {
+                let rounding = if terms.smooth { terms.rounding(pattern, x, i) } else { 0.0 };
+                let beyond = (terms.f[i].abs() - 4.0 * rounding).max(0.0);
+                if phi(i) > 0.0 {
+                    alone = alone.max(beyond / phi(i));
+                }
+            }
+        }
         if !self.natural(problem, x, 2).is_finite() {
             return f64::INFINITY;
         }
         let shares = self.moved.iter().zip(&sizes).zip(&self.gammas);
-        shares.filter(|(_, g)| **g > 0.0).fold(0.0, |own, ((r, xi), _)| own.max(r.abs() / xi))
+        shares.filter(|(_, g)| **g > 0.0).fold(alone, |own, ((r, xi), _)| own.max(r.abs() / xi))
     }
 
     /// ξ and γ at a point where the terms of F are φ.
@@ -345,7 +375,10 @@ impl ViGauge {
         let relative = self.natural(problem, x, 1) / xi;
         self.kept.copy_from_slice(&self.moved);
         // Of a point that is far from a solution it says nothing new.
-        let own = (relative < LOOKED_AT).then(|| self.own(problem, x));
+        let own = match precisely && self.cut_short {
+            true => Some(NEVER),
+            false => (relative < LOOKED_AT).then(|| self.own(problem, x)),
+        };
         self.gammas.fill(1.0);
         let absolute = self.natural(problem, x, 0);
         std::mem::swap(&mut self.moved, &mut self.kept);
@@ -408,6 +441,39 @@ impl ViGauge {
             worst,
         }
     }
+}
+
+/// How far each variable reaches in its bounds.
+fn reaches(problem: &Vi) -> Vec<f64> {
+    let mut out = vec![f64::INFINITY; problem.dim()];
+    for (first, set) in problem.set.parts() {
+        if let Set::Box { lower, upper } = set {
+            for (k, (l, u)) in lower.iter().zip(upper).enumerate() {
+                out[first + k] = reach(problem.start[first + k], *l, *u);
+            }
+        }
+    }
+    out
+}
+
+/// Which variables of a set that is no product a constraint that is no farther than `near` may hold together with others; of a box, which joins none, nothing.
+fn held_near(set: &Set, x: &[f64], near: f64) -> Vec<bool> {
+    let held = match set {
+        Set::Box { .. } | Set::Product(_) => return vec![],
+        Set::Ball { centre, radius } => distance(x, centre) >= radius - near,
+        Set::SecondOrderCone { .. } => (x[0] - norm(&x[1..])) / 2f64.sqrt() <= near,
+        Set::Polyhedron { A, C, .. } => {
+            let mut holds = vec![];
+            rows(set, x, |excess, bound| holds.push(!bound || excess >= -near));
+            let mut held = vec![false; x.len()];
+            for (i, j, _) in A.triplets().chain(C.triplets().map(|(i, j, a)| (A.nrows() + i, j, a)))
+            {
+                held[j] |= holds[i];
+            }
+            return held;
+        }
+    };
+    vec![held; x.len()]
 }
 
 /// ξ and `γ = ξ/φ` of a part of this size.

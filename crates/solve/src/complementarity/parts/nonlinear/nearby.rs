@@ -6,6 +6,7 @@
 
 use nonsmooth_linalg::budget;
 use nonsmooth_problem::Mcp;
+use nonsmooth_problem::field::tentatively;
 
 /// Trials, and places of the Jacobian and rows that they may look at together: some hundredths of a second.
 const TRIALS: usize = 5000;
@@ -52,7 +53,7 @@ pub fn nearby(problem: &Mcp, x: &mut [f64], target: f64) -> bool {
                 }
                 left -= 1;
                 x[j] = there;
-                if field.precisely(x, &mut f) {
+                if tentatively(|| field.precisely(x, &mut f)) {
                     let (at, size) = worst(x, &f);
                     if size < best.map_or(error, |b| b.3) {
                         best = Some((j, there, at, size));
