@@ -543,15 +543,7 @@ impl<P: Problem + Sync, S: Solver<P>> Session<P> for Driver<P, S> {
         // Whatever happens in the preparation, there is a judged point.
         let start = observer.keeps_best().then(|| {
             let mut first = point.clone();
-            let mut measure = problem.measure(&first, judge);
-            // A start is given by its impulses alone.
-            if problem.follow_impulses(&mut first, judge) {
-                measure = problem.measure(&first, judge);
-            }
-            // Who is given up may have no other point, and nobody looks at it again.
-            if measure.passes(limits.tolerance) {
-                measure = problem.certify(&first, judge);
-            }
+            let measure = of_start(problem, &mut first, judge, (limits.tolerance, false));
             observer.best(&first, &measure);
             (first, measure)
         });
@@ -957,24 +949,32 @@ pub(crate) fn or_start<P: Problem>(
     point: &mut P::Point,
     gauge: &mut P::Gauge,
     measure: Measure,
-    (tolerance, closely): (f64, bool),
+    how: (f64, bool),
 ) -> Measure {
     if *start == *point {
         return measure;
     }
-    let mut first = problem.measure(start, gauge);
-    // A start is given by its impulses alone.
-    if problem.follow_impulses(start, gauge) && !closely {
-        first = problem.measure(start, gauge);
-    }
-    if closely || first.passes(tolerance) {
-        first = problem.certify(start, gauge);
-    }
+    let first = of_start(problem, start, gauge, how);
     if !first.is_better_than(&measure) {
         return measure;
     }
     P::copy_point(start, point);
     first
+}
+
+/// The residuals of a start, which is given by its impulses alone; certified if `closely`, or where it looks solved at the tolerance: nobody may look at it again.
+fn of_start<P: Problem>(
+    problem: &P,
+    start: &mut P::Point,
+    gauge: &mut P::Gauge,
+    (tolerance, closely): (f64, bool),
+) -> Measure {
+    let plain = problem.measure(start, gauge);
+    let plain = match problem.follow_impulses(start, gauge) && !closely {
+        true => problem.measure(start, gauge),
+        false => plain,
+    };
+    if closely || plain.passes(tolerance) { problem.certify(start, gauge) } else { plain }
 }
 
 /// Since when a solve gets no further.
