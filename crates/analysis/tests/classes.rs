@@ -130,6 +130,26 @@ fn the_classics() {
     );
 }
 
+/// B Bᵀ with rows of B that add to nothing, in units that take products of pivots out of the range of doubles.
+#[test]
+fn units_make_nothing_definite() {
+    for n in [3_usize, 6, 10, 12] {
+        let chosen = |i: usize, j: usize| ((7 * i + 5 * j + i * j * j) % 3) as f64 - 1.0;
+        let b = |i: usize, j: usize| match i + 1 == n {
+            true => -(0..i).map(|k| chosen(k, j)).sum::<f64>(),
+            false => chosen(i, j),
+        };
+        for exponent in [-300, -60, -40, 0, 40, 60, 300] {
+            let unit = f64::from(exponent).exp2();
+            let entry = |i, j| (0..n).map(|k| b(i, k) * b(j, k)).sum::<f64>() * unit;
+            let c = of(&Dense::from_fn(n, n, entry).into());
+            for class in [PositiveDefinite, P, StrictlyCopositive] {
+                assert!(!c.is(class), "{n}, 2^{exponent}, {class}: {c}");
+            }
+        }
+    }
+}
+
 #[test]
 fn singular_and_semidefinite() {
     // e eᵀ.

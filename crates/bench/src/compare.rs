@@ -128,9 +128,9 @@ pub struct Comparison {
     pub additional: usize,
     /// What limits the comparison.
     pub warnings: Vec<String>,
-    /// Solved before and not any more, or the other way: with a solution where a proof said that there is none.
+    /// Solved before and not any more, or by a proof that there is no solution where there was one.
     pub newly_unsolved: Vec<Outcome>,
-    /// Not solved before.
+    /// Not solved before, or by a proof that there is no solution where there is one now.
     pub newly_solved: Vec<Outcome>,
     /// Not solved in either, for another reason.
     pub other_failure: Vec<Outcome>,
@@ -230,8 +230,11 @@ fn positive(seconds: Option<f64>) -> Option<f64> {
 fn outcome(all: &mut Comparison, a: &Run, b: &Run) {
     let ended = || Outcome { pair: pair(b), old: a.ending, new: b.ending };
     match (a.solved(), b.solved()) {
-        // A solution where a proof excluded one, or the reverse: one of the two is wrong.
-        (true, true) if a.ending != b.ending => all.newly_unsolved.push(ended()),
+        // A proof excludes exact solutions, not those within the tolerance: neither need be wrong, but a solution that went is a loss.
+        (true, true) if a.ending != b.ending => match b.ending {
+            Ending::Solved => all.newly_solved.push(ended()),
+            _ => all.newly_unsolved.push(ended()),
+        },
         (true, false) => all.newly_unsolved.push(ended()),
         (false, true) => all.newly_solved.push(ended()),
         (true, true) => {
@@ -277,11 +280,12 @@ fn spread(run: &Run) -> Option<f64> {
     (run.repeats > 1).then(|| (slowest / fastest).max(1.0))
 }
 
-/// The spread that nine tenths of the repeated runs keep within; 1 where none was repeated.
+/// The least spread that nine tenths of the repeated runs keep within; 1 where none was repeated.
 fn usual_spread(old: &Runs, new: &Runs) -> f64 {
     let mut all: Vec<f64> = old.runs.iter().chain(&new.runs).filter_map(spread).collect();
     all.sort_by(f64::total_cmp);
-    all.get(all.len() * 9 / 10).copied().unwrap_or(1.0)
+    let rank = (9 * all.len()).div_ceil(10);
+    rank.checked_sub(1).map_or(1.0, |last| all[last])
 }
 
 /// The mean of the logarithms with its interval, and the sign test.
@@ -372,7 +376,8 @@ impl Comparison {
                 false => String::new(),
             };
             format!(
-                "{solver}{on}: {ratio:.3}, {interval}, {pairs} pairs: {faster} faster, {slower} slower (sign test {sign_test:.2}){mark}"
+                "{solver}{on}: {ratio:.3}, {interval}, {}: {faster} faster, {slower} slower (sign test {sign_test:.2}){mark}",
+                plural(*pairs, "pair")
             )
         };
         list(

@@ -8,6 +8,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use crate::draw::{Axis, GRID, INK, LOOKS, Mark, Style, decades, font, tick, ticks};
+use crate::page::names;
 use crate::plural;
 use crate::profile::{
     Cost, Costs, Curve, DECADES, Progress, Selection, VIRTUAL_BEST, performance,
@@ -128,8 +129,7 @@ pub fn scaling(
             });
         }
     }
-    let mut svg = String::new();
-    sheet(&mut svg, title, notes, &panels, &[]).map_err(|e| format!("{name}: {e}"))?;
+    let svg = picture(title, notes, &panels, &[]).map_err(|e| format!("{name}: {e}"))?;
     let rows = all.iter().flat_map(|panel| {
         panel.curves.iter().flat_map(move |(label, points)| {
             points.iter().map(move |(n, t)| {
@@ -237,7 +237,8 @@ impl<'a> Scene<'a> {
         let title = format!("Performance profile by {by}");
         let n = costs.problems.len();
         let mut notes = vec![format!(
-            "share of {n} problems solved to {:e} within τ times the best; failures never count as solved",
+            "share of {} solved to {:e} within τ times the best; failures never count as solved",
+            plural(n, "problem"),
             self.selection.tolerance
         )];
         let missing: usize = costs.missing.iter().sum();
@@ -280,7 +281,7 @@ impl<'a> Scene<'a> {
     }
 
     fn data_profile(&self, progress: &Progress) -> Result<Option<Figure>, String> {
-        let tolerances = self.runs.tolerances();
+        let tolerances = self.runs.tolerances_of(&self.selection.kind);
         let step = tolerances.len().div_ceil(PANELS).max(1);
         let best = progress.best();
         let of = |&e: &f64| (e, [best.data_profile(e), progress.data_profile(e)].concat());
@@ -302,9 +303,9 @@ impl<'a> Scene<'a> {
                 series: self.series(curves, &x, f64::log10),
             })
             .collect();
-        let n = progress.problems.len();
+        let n = plural(progress.problems.len(), "problem");
         let mut notes =
-            vec![format!("share of {n} problems on which the residual is reached within the time")];
+            vec![format!("share of {n} on which the residual is reached within the time")];
         notes.extend(without(&progress.left_out, "residuals"));
         let mut rows = vec![];
         for (e, curves) in all.iter().rev() {
@@ -362,7 +363,8 @@ impl<'a> Scene<'a> {
                 }));
             }
         }
-        let tightest = self.runs.tolerances().last().copied().unwrap_or(0.0);
+        let tolerances = self.runs.tolerances_of(&self.selection.kind);
+        let tightest = tolerances.last().copied().unwrap_or(0.0);
         let mut notes = vec![format!(
             "share of problems with a smaller residual in any run; runs stop at their own tolerance, the tightest is {tightest:e}"
         )];
@@ -408,9 +410,9 @@ impl<'a> Scene<'a> {
                     .collect(),
             })
             .collect();
-        let n = progress.problems.len();
+        let n = plural(progress.problems.len(), "problem");
         let mut notes =
-            vec![format!("the residual that is reached on so many of {n} problems, against time")];
+            vec![format!("the residual that is reached on so many of {n}, against time")];
         notes.extend(without(&progress.left_out, "residuals"));
         let mut rows = vec![];
         for ((part, _), (_, curves)) in PARTS.into_iter().zip(&all) {
@@ -433,8 +435,7 @@ impl<'a> Scene<'a> {
     ) -> Result<Figure, String> {
         let (legend, sources) = self.legend(solvers);
         notes.extend(sources);
-        let mut svg = String::new();
-        sheet(&mut svg, &title, &notes, panels, &legend).map_err(|e| format!("{name}: {e}"))?;
+        let svg = picture(&title, &notes, panels, &legend).map_err(|e| format!("{name}: {e}"))?;
         Ok(Figure { name, title, svg, csv })
     }
 }
@@ -507,13 +508,28 @@ const SINGLE: (u32, u32) = (430, 640);
 const LINE: u32 = 18;
 /// The width of a character of 12 px, near enough.
 const CHARACTER: f64 = 6.4;
-/// Labels longer than this are cut.
+/// Longer labels are cut to this length.
 const LABEL: usize = 38;
 /// Marks along a curve.
 const MARKED: usize = 7;
 
 type Drawn = Result<(), Box<dyn std::error::Error>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+
+/// The picture, as XML whatever its texts hold.
+fn picture(
+    title: &str,
+    notes: &[String],
+    panels: &[Panel],
+    legend: &[(String, Style)],
+) -> Result<String, Box<dyn std::error::Error>> {
+    let mut svg = String::new();
+    sheet(&mut svg, title, notes, panels, legend)?;
+    // XML takes these in no form, not even escaped.
+    let barred =
+        |c: char| c.is_control() && !"\n\t".contains(c) || matches!(c, '\u{fffe}' | '\u{ffff}');
+    Ok(svg.replace(barred, "\u{fffd}"))
+}
 
 /// Title and notes on top, panels side by side in rows, the legend on the right.
 fn sheet(
@@ -525,7 +541,7 @@ fn sheet(
 ) -> Drawn {
     let columns = panels.len().min(2);
     let rows = panels.len().div_ceil(columns.max(1)) as u32;
-    let labels: Vec<String> = legend.iter().map(|(label, _)| cut(label)).collect();
+    let labels = cut(legend.iter().map(|(label, _)| label.as_str()));
     let longest = labels.iter().map(|l| l.chars().count()).max().unwrap_or(0);
     let legend_width = match longest {
         0 => 0,
@@ -558,11 +574,21 @@ fn sheet(
     Ok(())
 }
 
-fn cut(label: &str) -> String {
-    match label.char_indices().nth(LABEL) {
-        Some((at, _)) => format!("{}…", &label[..at]),
-        None => label.into(),
+/// Labels with the middle of the long ones cut out, as both ends tell them apart; what is then alike is numbered.
+fn cut<'a>(all: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let short = |label: &str| -> String {
+        let n = label.chars().count();
+        let part = if n > LABEL { LABEL / 2 } else { n };
+        let end = label.chars().skip(part.max(n - part));
+        let gap = (n > LABEL).then_some('…');
+        label.chars().take(part).chain(gap).chain(end).collect()
+    };
+    let mut labels: Vec<String> = vec![];
+    for label in all {
+        let free = names(short(label)).find(|name| !labels.contains(name));
+        labels.extend(free);
     }
+    labels
 }
 
 /// A curve in pixels, with its marks.

@@ -239,12 +239,20 @@ fn json_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
                     Value::String(text) => text,
                     other => other.to_string(),
                 };
-                let row: HashMap<_, _> =
-                    fields.into_iter().map(|(k, v)| (canonical(&k), text(v))).collect();
-                columns.extend(
-                    row.keys().filter(|k| !columns.contains(k)).cloned().collect::<Vec<_>>(),
-                );
-                Ok(Cells(row))
+                let (mut row, mut twice) = (HashMap::new(), None);
+                for (name, value) in fields {
+                    let column = canonical(&name);
+                    if !columns.contains(&column) {
+                        columns.push(column.clone());
+                    }
+                    if row.insert(column.clone(), text(value)).is_some() {
+                        twice = USED.into_iter().find(|used| *used == column).or(twice);
+                    }
+                }
+                match twice {
+                    None => Ok(Cells(row)),
+                    Some(column) => Err(format!("expected one column `{column}`, found several")),
+                }
             }
             Ok(_) => Err("expected an object, found another value".into()),
             Err(e) => Err(format!("expected an object, found {e}")),

@@ -42,10 +42,16 @@ pub fn page(
         let mut show = |figure: Option<Figure>, name: &str| {
             figure.map_or_else(String::new, |f| show(f, kind, name, folder, &mut shown))
         };
-        for tolerance in runs.tolerances() {
+        let tolerances = runs.tolerances_of(kind);
+        for &tolerance in &tolerances {
             let selection = at(tolerance);
             let rows = summary(runs, &selection, By::All);
-            short += &format!("- {heading}, to {tolerance:e}: {}", findings(&rows));
+            short += &format!("- {heading}, to {tolerance:e}: ");
+            let Some(best) = taken(&rows) else {
+                short += "every solver refuses them.\n";
+                continue;
+            };
+            short += &findings(best, &rows);
             body += &format!("\n### To {tolerance:e}\n\n{}", summary_page(&rows).markdown());
             let profile = figures::profile(runs, &selection, Cost::Seconds)?;
             let reached = format!("{tolerance:e}").replace('.', "p");
@@ -55,9 +61,11 @@ pub fn page(
             body += &winners(runs, &selection);
             body += &nobody(runs, &selection);
         }
-        if let Some(tightest) = runs.tolerances().last() {
+        if let Some(tightest) = tolerances.last()
+            && let Some(figure) = figures::success(runs, &at(*tightest))?
+        {
             body += "\n### Success against tolerance\n";
-            body += &show(figures::success(runs, &at(*tightest))?, "success");
+            body += &show(Some(figure), "success");
         }
     }
     if let Some(traits) = traits {
@@ -156,26 +164,37 @@ fn measured(campaign: &Campaign) -> String {
     text
 }
 
-/// What the rows of all problems say, in sentences.
-fn findings(rows: &[Row]) -> String {
-    let Some(best) = rows.iter().find(|r| r.solver == VIRTUAL_BEST) else { return String::new() };
+/// The row of the virtual best, unless every solver refuses every problem.
+fn taken(rows: &[Row]) -> Option<&Row> {
+    rows.iter().find(|r| r.solver == VIRTUAL_BEST && r.taken() > 0)
+}
+
+/// What the rows of all problems say, in sentences; problems that every solver refuses do not count.
+fn findings(best: &Row, rows: &[Row]) -> String {
     let (most, who) = leaders(rows, |r| r.solved);
     let (fastest, fast) = leaders(rows, |r| r.fastest);
     let (who, fast) = (listed(&who), listed(&fast));
     if most == 0 {
-        return format!("no solver solves any of the {}.\n", plural(best.problems, "problem"));
+        return format!("no solver solves any of the {}.\n", plural(best.taken(), "problem"));
     }
-    let left = match best.problems - best.solved {
-        0 => "every problem is solved by at least one solver".into(),
-        n => format!(
-            "{} by none",
-            if n == 1 { "one is solved".into() } else { format!("{n} are solved") }
-        ),
+    let are = |n: usize, what: &str| match n {
+        1 => format!("one is {what}"),
+        n => format!("{n} are {what}"),
     };
-    format!(
-        "most problems are solved by {who}, {most} of {}; {left}. Most often the fastest is {fast}, on {fastest}.\n",
-        best.problems
-    )
+    let mut left = match best.taken() - best.solved {
+        0 => "every problem is solved by at least one solver".into(),
+        n => are(n, "solved by none"),
+    };
+    if best.refused > 0 {
+        left += &format!("; beside them {}", are(best.refused, "refused by all"));
+    }
+    let mut text =
+        format!("most problems are solved by {who}, {most} of {}; {left}.", best.taken());
+    // Solved runs need not have a time.
+    if fastest > 0 {
+        text += &format!(" Most often the fastest is {fast}, on {fastest}.");
+    }
+    text + "\n"
 }
 
 /// The most that a solver has of something, and the labels of those that have it.
@@ -244,7 +263,7 @@ fn winners(runs: &Runs, selection: &Selection) -> String {
         rows: vec![],
     };
     for family in rows.chunk_by(|a, b| a.group == b.group) {
-        let Some(any) = family.iter().find(|r| r.solver == VIRTUAL_BEST) else { continue };
+        let Some(any) = taken(family) else { continue };
         let solvers = family.len() - 1;
         let leaders = |value| match leaders(family, value) {
             (0, _) => "nobody".into(),
@@ -253,7 +272,7 @@ fn winners(runs: &Runs, selection: &Selection) -> String {
         };
         table.rows.push(vec![
             any.group.clone(),
-            any.problems.to_string(),
+            any.taken().to_string(),
             any.solved.to_string(),
             leaders(|r| r.solved),
             leaders(|r| r.fastest),
@@ -381,6 +400,45 @@ mod tests {
         }
         let names: BTreeSet<_> = page.figures.iter().map(|f| &f.name).collect();
         assert_eq!((names.len(), page.figures.len()), (4, 4));
+    }
+
+    /// Two kinds at a tolerance of their own each, one without figure of success, and one that no solver takes.
+    #[test]
+    fn kinds_have_tolerances_of_their_own_and_no_empty_sections() {
+        use Ending::{Refused, Solved, Stalled};
+        let at = |tolerance, run| Run { tolerance, ..run };
+        let untold = |run| Run { residuals: Residuals::default(), seconds: None, ..run };
+        let runs = vec![
+            at(1e-4, run("f/a", "lcp", "A", Solved, 1.0)),
+            at(1e-4, run("f/b", "lcp", "A", Refused, 1.0)),
+            at(1e-4, run("f/c", "lcp", "A", Stalled, 1.0)),
+            at(1e-4, run("e/d", "lcp", "A", Refused, 1.0)),
+            untold(run("g/a", "mcp", "A", Solved, 1.0)),
+            run("h/a", "vi", "A", Refused, 1.0),
+            run("h/a", "vi", "B", Refused, 1.0),
+        ];
+        let page = page(&Runs { runs, ..example() }, None, "figures", "make it", true).unwrap();
+        let (begin, body) = page.markdown.split_once("\n## Problems").unwrap();
+        let (_, short) = begin.split_once("## In short\n\n").unwrap();
+        assert_eq!(
+            short,
+            "- Problems of kind lcp, to 1e-4: most problems are solved by `A`, 1 of 2; one is solved by none; beside them 2 are refused by all. Most often the fastest is `A`, on 1.\n\
+             - Problems of kind mcp, to 1e-8: most problems are solved by `A`, 1 of 1; every problem is solved by at least one solver.\n\
+             - Problems of kind vi, to 1e-8: every solver refuses them.\n"
+        );
+        let body = body.split("\n## Problems").collect::<Vec<_>>();
+        let headings = |part: &str| {
+            let lines = part.lines().filter_map(|l| l.strip_prefix("### "));
+            lines.map(String::from).collect::<Vec<_>>()
+        };
+        assert_eq!(headings(body[0]), ["To 1e-4", "Success against tolerance"], "{}", body[0]);
+        assert_eq!(headings(body[1]), ["To 1e-8"], "{}", body[1]);
+        assert_eq!(body[2].trim_end(), " of kind vi\n\n1 problem.");
+        // What all refuse is no problem of the tables that count.
+        assert!(body[0].contains("| f | 2 | 1 | `A` (1) | `A` (1) |\n\n| unsolved"), "{}", body[0]);
+        assert!(!body[0].contains("f/b") && !body[0].contains("| e |"), "{}", body[0]);
+        assert!(body[0].contains("| A | 2 | 1 | 1 | 1 |"), "{}", body[0]);
+        assert!(body[1].contains("| A | 1 | 1 | 0 | 0 |"), "{}", body[1]);
     }
 
     #[test]

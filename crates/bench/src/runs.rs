@@ -212,7 +212,17 @@ impl Runs {
 
     /// The tolerances, the largest first.
     pub fn tolerances(&self) -> Vec<f64> {
-        let mut all: Vec<f64> = self.runs.iter().map(|r| r.tolerance).collect();
+        self.tolerances_where(|_| true)
+    }
+
+    /// The tolerances that a kind of problem has runs at, the largest first.
+    pub fn tolerances_of(&self, kind: &str) -> Vec<f64> {
+        self.tolerances_where(|run| run.kind == kind)
+    }
+
+    fn tolerances_where(&self, wanted: impl Fn(&Run) -> bool) -> Vec<f64> {
+        let mut all: Vec<f64> =
+            self.runs.iter().filter(|r| wanted(r)).map(|r| r.tolerance).collect();
         all.sort_by(|a, b| b.total_cmp(a));
         all.dedup();
         all

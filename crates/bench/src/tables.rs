@@ -55,8 +55,13 @@ impl Row {
         self.share(self.fastest)
     }
 
+    /// The problems that it does not refuse.
+    pub fn taken(&self) -> usize {
+        self.problems - self.refused
+    }
+
     fn share(&self, part: usize) -> Option<f64> {
-        let of = self.problems - self.refused;
+        let of = self.taken();
         (of > 0).then(|| part as f64 / of as f64)
     }
 }
@@ -145,17 +150,19 @@ fn geometric_mean(all: &[f64]) -> Option<f64> {
 /// The factors of the least time within which a solver of BillupsDirkseFerris1997 is *very competitive*, and *competitive*.
 pub const COMPETITIVE: [f64; 2] = [4.0 / 3.0, 2.0];
 
-/// For each solver of the selection: problems solved, and those solved in `T ≤ 4/3 T_min` and `T ≤ 2 T_min`, with T_min the least time of the selected solvers.
+/// For each solver of the selection: problems that it does not refuse, those solved, and those solved in `T ≤ 4/3 T_min` and `T ≤ 2 T_min`, with T_min the least time of the selected solvers.
 ///
 /// References: BillupsDirkseFerris1997.
 pub fn competitive(runs: &Runs, selection: &Selection) -> Table {
     let costs = Costs::of(runs, selection, Cost::Seconds);
     let head = ["solver", "problems", "solved", "T ≤ 4/3 T_min", "T ≤ 2 T_min"];
-    let rows = costs.solvers.iter().zip(costs.ratios()).enumerate().map(|(s, (solver, ratios))| {
+    // The rows of the solvers, before that of the virtual best.
+    let rows = summary(runs, selection, By::All).into_iter().zip(costs.ratios());
+    let rows = rows.map(|(row, ratios)| {
         let within = |factor: f64| ratios.iter().filter(|r| **r <= factor).count();
         let [very, fairly] = COMPETITIVE.map(within);
-        let counts = [costs.applicable(s), within(f64::MAX), very, fairly];
-        std::iter::once(solver.clone()).chain(counts.map(|n| n.to_string())).collect()
+        let counts = [row.taken(), row.solved, very, fairly];
+        std::iter::once(row.solver).chain(counts.map(|n| n.to_string())).collect()
     });
     Table { head: head.map(String::from).into(), rows: rows.collect() }
 }
@@ -177,13 +184,15 @@ pub struct Unsolved {
     pub endings: BTreeMap<Ending, usize>,
 }
 
-/// The problems on which solvers were run at the tolerance of the selection and that none solved.
+/// The problems on which solvers were run at the tolerance of the selection and that none solved, but for those that all of them refuse.
 pub fn unsolved(runs: &Runs, selection: &Selection) -> Vec<Unsolved> {
     let mut all: BTreeMap<&str, Vec<&Run>> = BTreeMap::new();
     for run in selection.taken(runs, &selection.solvers(runs)) {
         all.entry(&run.problem).or_default().push(run);
     }
-    let none = all.into_iter().filter(|(_, runs)| !runs.iter().any(|r| r.solved()));
+    let none = all.into_iter().filter(|(_, runs)| {
+        runs.iter().any(|r| r.ending != Ending::Refused) && !runs.iter().any(|r| r.solved())
+    });
     none.map(|(problem, runs)| {
         let reached = runs.iter().filter_map(|r| Some((&r.solver, r.residuals.reached?)));
         let closest = reached.min_by(|a, b| a.1.total_cmp(&b.1));

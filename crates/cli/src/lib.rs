@@ -114,11 +114,14 @@ pub fn program() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) if e.to_string().starts_with("error: ") => {
-            output::error(&one_line(&e.to_string()));
+            output::error(&one_line(&e.to_string(), &arguments()));
             return ExitCode::from(Exit::Mistake as u8);
         }
         // Help and version are answers, not mistakes; without any argument the help is the answer.
-        Err(answer) => answer.exit(),
+        Err(answer) => {
+            output::printed(answer.print());
+            return ExitCode::from(u8::try_from(answer.exit_code()).unwrap_or(u8::MAX));
+        }
     };
     let done = match cli.command {
         Command::Solve(args) => solve::run(&args),
@@ -156,17 +159,38 @@ fn arguments() -> Vec<String> {
     std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect()
 }
 
-/// A usage error as one line: its paragraphs up to the usage text, joined.
-fn one_line(message: &str) -> String {
+/// A usage error of these words as one line: its paragraphs up to the usage text, joined.
+fn one_line(message: &str, words: &[String]) -> String {
     let lines = message.trim_start_matches("error: ").lines().map(str::trim);
     let said = lines
         .take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more information"))
         .filter(|l| !l.is_empty());
     said.fold(String::new(), |text, line| match line {
         line if text.is_empty() => line.into(),
-        tip if tip.starts_with("tip:") => format!("{text}; {tip}"),
+        tip if tip.starts_with("tip:") => {
+            format!("{text}; {}", joined(tip, words).as_deref().unwrap_or(tip))
+        }
         line => format!("{text} {line}"),
     })
+}
+
+/// The tip for the value of an option that is taken for options, as it begins with `-`. After `--` it would be none of that option.
+fn joined(tip: &str, words: &[String]) -> Option<String> {
+    // Of `-x.hdf5` it names `-x`.
+    let begins = tip.strip_prefix("tip: to pass '")?.split('\'').next()?;
+    let program = Cli::command();
+    let command =
+        words.iter().skip(1).fold(&program, |c, word| c.find_subcommand(word).unwrap_or(c));
+    let takes_value = |option: &str| {
+        let is =
+            |a: &&clap::Arg| a.get_long().is_some() && a.get_long() == option.strip_prefix("--");
+        let mistaken =
+            |a: &clap::Arg| a.get_action().takes_values() && !a.is_allow_hyphen_values_set();
+        command.get_arguments().find(is).is_some_and(mistaken)
+    };
+    let pair = words.windows(2).find(|w| w[1].starts_with(begins) && takes_value(&w[0]))?;
+    let (option, value) = (&pair[0], &pair[1]);
+    Some(format!("tip: to pass '{value}' as the value of '{option}', use '{option}={value}'"))
 }
 
 #[cfg(test)]
@@ -177,7 +201,8 @@ mod tests {
     fn usage_errors_are_one_line() {
         let message = |arguments: &str| {
             let all = ["nonsmooth"].into_iter().chain(arguments.split_whitespace());
-            one_line(&Cli::try_parse_from(all).unwrap_err().to_string())
+            let words: Vec<String> = all.map(String::from).collect();
+            one_line(&Cli::try_parse_from(&words).unwrap_err().to_string(), &words)
         };
         assert_eq!(
             message("solve"),
@@ -189,5 +214,15 @@ mod tests {
         );
         let abc = "invalid value 'abc' for '--tol <TOL>': invalid float literal";
         assert_eq!(message("solve x --tol abc"), abc);
+        // A value that begins with a dash is joined to its option; a name of a file comes after `--`.
+        assert_eq!(
+            message("gen wall --out -x.hdf5"),
+            "unexpected argument '-x' found; tip: to pass '-x.hdf5' as the value of '--out', use '--out=-x.hdf5'"
+        );
+        assert!(Cli::try_parse_from(["nonsmooth", "gen", "wall", "--out=-x.hdf5"]).is_ok());
+        for (c, words) in [("-x", "solve --json -x.hdf5"), ("-1", "solve a --tol -1 -1.hdf5")] {
+            let tip = format!("tip: to pass '{c}' as a value, use '-- {c}'");
+            assert_eq!(message(words), format!("unexpected argument '{c}' found; {tip}"));
+        }
     }
 }

@@ -21,9 +21,12 @@ pub fn print(text: &str) {
 
 /// As [`print()`], of a result that need not be text.
 pub fn print_bytes(bytes: &[u8]) {
-    let mut out = std::io::stdout().lock();
-    let written = out.write_all(bytes).and_then(|()| out.flush());
-    if let Err(e) = written {
+    printed(std::io::stdout().lock().write_all(bytes));
+}
+
+/// Ends the program as [`print()`] does where what was written to stdout did not arrive.
+pub fn printed(written: std::io::Result<()>) {
+    if let Err(e) = written.and_then(|()| std::io::stdout().flush()) {
         if e.kind() == ErrorKind::BrokenPipe {
             if FILED.load(Ordering::Relaxed) {
                 return;

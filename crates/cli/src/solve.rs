@@ -189,7 +189,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         let out = out.transpose()?;
         let guess = match &args.warm_start {
             None => None,
-            Some(from) => Some(guess(from.as_deref(), file, &content)?),
+            Some(from) => match guess(from.as_deref(), file, &content, &plan.limits.left(begun))? {
+                Ok(point) => Some(point),
+                Err(limit) => {
+                    return Ok(files::late(file, args.json, limit, files::WHILE_READ));
+                }
+            },
         };
         let plan = Plan { begun, ..plan.clone() };
         let solved = solve(file, &content.problem, guess.as_ref(), &plan)?;
@@ -232,8 +237,14 @@ fn warm_start_is_meant(args: &Args) -> Result<(), String> {
 /// The option that says where to start.
 const WARM_START: &str = "--warm-start";
 
-/// The point to start from that a file proposes itself, or that another one, or that of the same name in a directory, holds for its problem.
-fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<StoredPoint, String> {
+/// The point to start from that a file proposes itself, or that another one, or that of the same name in a directory, holds for its problem; the
+/// limit if it came before that one was read.
+fn guess(
+    from: Option<&Path>,
+    file: &Path,
+    content: &ProblemFile,
+    limits: &Limits,
+) -> Result<Result<StoredPoint, Limit>, String> {
     let Some(from) = from else {
         let about = files::about(file)?;
         // Formats without guesses propose the solution.
@@ -242,14 +253,17 @@ fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<Stor
             None => (about.solution, content.solution.as_ref()),
         };
         let file = file.display();
-        return point.cloned().ok_or_else(|| {
+        return point.cloned().map(Ok).ok_or_else(|| {
             format!(
                 "{file}: {place}: expected a point for --warm-start, found none; --warm-start=FILE takes that of another file"
             )
         });
     };
     let path = other_file(from, file);
-    let other = files::read(&path).map_err(|e| format!("--warm-start {e}"))?;
+    let other = match files::read_within(&path, limits).map_err(|e| format!("--warm-start {e}"))? {
+        Ok(other) => other,
+        Err(limit) => return Ok(Err(limit)),
+    };
     let refused = |expected: String, found: &str| {
         format!("--warm-start {}: expected {expected}, found {found}", path.display())
     };
@@ -259,7 +273,7 @@ fn guess(from: Option<&Path>, file: &Path, content: &ProblemFile) -> Result<Stor
     }
     let point = other.solution.or(other.guesses.into_iter().next());
     let about = files::about(&path)?;
-    point.ok_or_else(|| match about.guess {
+    point.map(Ok).ok_or_else(|| match about.guess {
         Some(guess) => refused(format!("a {} or {guess}", about.solution), "neither"),
         None => refused(format!("a {}", about.solution), "none"),
     })

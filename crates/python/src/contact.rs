@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::numbers::{self, Scalar, by_contact, of_contacts};
-use crate::parts::{Given, Shown};
+use crate::parts::{Given, Shown, put, put_bound};
 use crate::{expected, mistake};
 
 /// The letters of the local form.
@@ -169,14 +169,6 @@ fn bounds(given: &mut Given<'_, '_>, rows: usize) -> PyResult<Bounds> {
     })
 }
 
-/// Puts a vector that is given in the place of another.
-fn put(given: &mut Given<'_, '_>, name: &'static str, into: &mut Vec<f64>) -> PyResult<()> {
-    if let Some(other) = given.get(name)? {
-        *into = numbers::vector(name, &other)?;
-    }
-    Ok(())
-}
-
 /// As [`put`], of a vector by contacts with D components each.
 fn put_by_contact<const D: usize>(
     given: &mut Given<'_, '_>,
@@ -204,8 +196,8 @@ fn put_bounds(given: &mut Given<'_, '_>, rows: usize, into: &mut Bounds) -> PyRe
         if old.lower.is_empty() {
             old = Bounds { lower: vec![lower; rows], upper: vec![upper; rows] };
         }
-        put(given, "lower", &mut old.lower)?;
-        put(given, "upper", &mut old.upper)?;
+        put_bound(given, "lower", rows, &mut old.lower)?;
+        put_bound(given, "upper", rows, &mut old.upper)?;
         *into = old;
     }
     Ok(())

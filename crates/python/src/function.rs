@@ -2,7 +2,7 @@
 //!
 //! The library calls them from the thread that solves, which holds Python's lock meanwhile, in the context (`contextvars`) in which the solve was asked for. An exception ends
 //! that solve, in which nothing is called any more, and is raised where it was called; but where F is only asked whether it is defined ([`is_tentative`]) it is the answer that it is
-//! not. Cost of a call: that of the function, and two copies of n numbers.
+//! not, unless it says nothing of x ([`Fault`]). Cost of a call: that of the function, and two copies of n numbers.
 
 use std::cell::RefCell;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,8 +11,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use nonsmooth_linalg::{Csc, Matrix};
 use nonsmooth_problem::field::{Closures, Differences, Field, Pattern, is_tentative};
 use numpy::PyArray1;
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyMemoryError, PyNameError, PyRecursionError};
 use pyo3::prelude::*;
+use pyo3::{PyTraverseError, PyVisit};
 
 use crate::{expected, mistake, numbers};
 
@@ -28,8 +29,16 @@ pub struct Watcher {
     fault: Mutex<Option<PyErr>>,
     /// Whether it was a function of the user's that failed: then none is called any more.
     failed: AtomicBool,
+    undefined: Mutex<Undefined>,
     /// In which the functions run on another thread.
     context: Option<Py<PyAny>>,
+}
+
+/// Exceptions that were taken for a point where F is not defined.
+#[derive(Default)]
+struct Undefined {
+    count: usize,
+    first: String,
 }
 
 thread_local! {
@@ -68,6 +77,29 @@ impl Watcher {
         self.stop.store(true, Ordering::Relaxed);
     }
 
+    /// Keeps in mind that F is not defined somewhere, by what it raised.
+    fn note(&self, fault: &PyErr) {
+        let count = {
+            let mut undefined = locked(&self.undefined);
+            undefined.count += 1;
+            undefined.count
+        };
+        if count == 1 {
+            // Python runs here.
+            let said = numbers::first_line(&fault.to_string());
+            locked(&self.undefined).first = said;
+        }
+    }
+
+    /// What was taken for points where F is not defined, in a sentence.
+    pub fn undefined(&self) -> Option<String> {
+        let Undefined { count, first } = &*locked(&self.undefined);
+        let points = nonsmooth_problem::plural(*count, "point");
+        (*count > 0).then(|| {
+            format!("F or jac raised at {points} that were tried, as outside of its domain; first {first}")
+        })
+    }
+
     /// The exception that ended the solve.
     pub fn fault(&self) -> Option<PyErr> {
         locked(&self.fault).take()
@@ -101,22 +133,70 @@ impl Faults {
     }
 }
 
+/// A function of Python, until the garbage collector takes it.
+type Slot = Arc<Mutex<Option<Py<PyAny>>>>;
+
+/// The functions of a problem as the garbage collector sees them: one that refers to the object that holds the problem would keep both for ever.
+///
+/// Calls hold them too, out of its sight; so it is told of each of them here alone. Whoever of Python's objects holds calls holds this.
+#[pyclass(frozen, module = "nonsmooth._nonsmooth")]
+pub struct Functions(Vec<Slot>);
+
+#[pymethods]
+impl Functions {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        let mut functions = self.0.iter().filter_map(|slot| slot.try_lock().ok());
+        functions.try_for_each(|function| visit.call(&*function))
+    }
+
+    fn __clear__(&self) {
+        let taken: Vec<_> = self.0.iter().map(|slot| locked(slot).take()).collect();
+        drop(taken);
+    }
+}
+
+/// Why a function gave no values.
+struct Fault {
+    error: PyErr,
+    /// Whether it says nothing of x: the solve ends with it even where F is only asked whether it is defined.
+    everywhere: bool,
+}
+
+impl Fault {
+    /// By an exception of the function. Ctrl-C, memory and names say nothing of x.
+    fn raised(py: Python<'_>, error: PyErr) -> Self {
+        let everywhere = !error.is_instance_of::<PyException>(py)
+            || error.is_instance_of::<PyMemoryError>(py)
+            || error.is_instance_of::<PyRecursionError>(py)
+            || error.is_instance_of::<PyNameError>(py);
+        Self { error, everywhere }
+    }
+}
+
+/// What is given in a wrong form says nothing of x.
+impl From<PyErr> for Fault {
+    fn from(error: PyErr) -> Self {
+        Self { error, everywhere: true }
+    }
+}
+
 /// A function of Python: what it gives goes into a slice, which is NaN where it raises.
 struct Call {
-    function: Py<PyAny>,
+    function: Slot,
     faults: Arc<Faults>,
 }
 
 impl Call {
     fn new(function: &Bound<'_, PyAny>, faults: &Arc<Faults>) -> Self {
-        Self { function: function.clone().unbind(), faults: faults.clone() }
+        let slot = Mutex::new(Some(function.clone().unbind()));
+        Self { function: Arc::new(slot), faults: faults.clone() }
     }
 
     fn write(
         &self,
         x: &[f64],
         out: &mut [f64],
-        read: impl Fn(&Bound<'_, PyAny>, &mut [f64]) -> PyResult<()>,
+        read: impl Fn(&Bound<'_, PyAny>, &mut [f64]) -> Result<(), Fault>,
     ) {
         let asking = self.faults.asking();
         if !asking.is_empty() && asking.iter().all(|one| one.failed.load(Ordering::Relaxed)) {
@@ -128,26 +208,32 @@ impl Call {
         };
         // Without an interpreter, which is being shut down, nothing is defined.
         let done = Python::try_attach(|py| {
-            let (function, x) = (self.function.bind(py), PyArray1::from_slice(py, x));
+            let function = locked(&self.function).as_ref().map(|f| f.clone_ref(py));
+            let Some(function) = function else { return false };
+            let given = PyArray1::from_slice(py, x);
             let found = match context {
                 // A copy, since a context is entered by one thread at a time.
                 Some(context) => {
                     let copy = context.bind(py).call_method0("copy");
-                    copy.and_then(|copy| copy.call_method1("run", (function, x)))
+                    copy.and_then(|copy| copy.call_method1("run", (function, given)))
                 }
-                None => function.call1((x,)),
+                None => function.bind(py).call1((given,)),
             };
-            let done = found.and_then(|found| read(&found, out));
-            done.map_err(|fault| {
-                // Ctrl-C is no exception of the function's.
-                if !(is_tentative() && fault.is_instance_of::<PyException>(py)) {
-                    for one in &asking {
-                        one.failed.store(true, Ordering::Relaxed);
-                        one.fail(fault.clone_ref(py));
-                    }
+            let done = found.map_err(|error| Fault::raised(py, error));
+            let Err(Fault { error, everywhere }) = done.and_then(|found| read(&found, out)) else {
+                return true;
+            };
+            // NaN is put in for a pattern, not tried: nothing that comes of it is wrong.
+            let said = !everywhere || x.iter().any(|x| x.is_nan());
+            if is_tentative() && said && error.is_instance_of::<PyException>(py) {
+                asking.iter().for_each(|one| one.note(&error));
+            } else {
+                for one in &asking {
+                    one.failed.store(true, Ordering::Relaxed);
+                    one.fail(error.clone_ref(py));
                 }
-            })
-            .is_ok()
+            }
+            false
         });
         if done != Some(true) {
             out.fill(f64::NAN);
@@ -156,10 +242,13 @@ impl Call {
 }
 
 /// n values.
-fn values(found: &Bound<'_, PyAny>, out: &mut [f64]) -> PyResult<()> {
-    let all = numbers::vector("F(x)", found)?;
+fn values(found: &Bound<'_, PyAny>, out: &mut [f64]) -> Result<(), Fault> {
+    let all = numbers::vector("F(x)", found).map_err(|error| {
+        // The root of a negative number may be complex.
+        Fault { error, everywhere: !numbers::is_complex(found) }
+    })?;
     if all.len() != out.len() {
-        return Err(expected("F(x)", &format!("{} values", out.len()), all.len()));
+        return Err(expected("F(x)", &format!("{} values", out.len()), all.len()).into());
     }
     out.copy_from_slice(&all);
     Ok(())
@@ -178,8 +267,9 @@ fn square(place: &str, found: &Bound<'_, PyAny>, n: usize) -> PyResult<Matrix> {
 const JACOBIAN: &str = "jac(x)";
 
 /// The entries of a Jacobian at the places of a pattern; all others are zero.
-fn entries(found: &Bound<'_, PyAny>, pattern: &Pattern, out: &mut [f64]) -> PyResult<()> {
-    let matrix = square(JACOBIAN, found, pattern.rows())?;
+fn entries(found: &Bound<'_, PyAny>, pattern: &Pattern, out: &mut [f64]) -> Result<(), Fault> {
+    let matrix = square(JACOBIAN, found, pattern.rows())
+        .map_err(|error| Fault { error, everywhere: !numbers::is_complex(found) })?;
     out.fill(0.0);
     let mut outside = None;
     matrix.for_each(|i, j, x| match pattern.row(i).binary_search(&j) {
@@ -191,7 +281,12 @@ fn entries(found: &Bound<'_, PyAny>, pattern: &Pattern, out: &mut [f64]) -> PyRe
     });
     match outside {
         Some((i, j, x)) => {
-            Err(expected(&format!("{JACOBIAN}[{i}, {j}]"), "zero, as the pattern says", x))
+            let what = "zero, as the pattern says";
+            // Beyond the domain zero times infinity is not zero.
+            Err(Fault {
+                error: expected(&format!("{JACOBIAN}[{i}, {j}]"), what, x),
+                everywhere: false,
+            })
         }
         None => Ok(()),
     }
@@ -207,17 +302,18 @@ fn places(matrix: &Matrix) -> PyResult<Pattern> {
     Ok(pattern)
 }
 
-/// F by a function, with a Jacobian by another or by differences; x is where a pattern that nobody says is looked for.
+/// F by a function, with a Jacobian by another or by differences, and what the garbage collector knows of them; x is where a pattern that nobody says is looked for.
 pub fn field(
     function: &Bound<'_, PyAny>,
     jacobian: Option<&Bound<'_, PyAny>>,
     pattern: Option<&Bound<'_, PyAny>>,
     x: &[f64],
     faults: &Arc<Faults>,
-) -> PyResult<Arc<dyn Field>> {
+) -> PyResult<(Arc<dyn Field>, Functions)> {
     let watcher = Arc::new(Watcher::default());
     let _watching = faults.watch(&watcher);
     let call = Call::new(function, faults);
+    let mut functions = Functions(vec![call.function.clone()]);
     // A function that is of no use at the start says so before a solver meets it.
     call.write(x, &mut vec![0.0; x.len()], values);
     if let Some(fault) = watcher.fault() {
@@ -239,6 +335,7 @@ pub fn field(
     let field: Arc<dyn Field> = match (jacobian, pattern) {
         (Some(jacobian), Some(pattern)) => {
             let jac = Call::new(jacobian, faults);
+            functions.0.push(jac.function.clone());
             let along = pattern.clone();
             let jac = move |x: &[f64], j: &mut [f64]| {
                 jac.write(x, j, |found, out| entries(found, &along, out));
@@ -252,6 +349,6 @@ pub fn field(
     };
     match watcher.fault() {
         Some(fault) => Err(fault),
-        None => Ok(field),
+        None => Ok((field, functions)),
     }
 }

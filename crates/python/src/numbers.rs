@@ -10,8 +10,9 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
+use pyo3::types::{PyFloat, PyList, PyTuple};
 
-use crate::{expected, mistake};
+use crate::{DEEPEST, expected, mistake};
 
 fn numpy<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
     static NUMPY: PyOnceLock<Py<PyModule>> = PyOnceLock::new();
@@ -32,7 +33,7 @@ fn array<'py, T: Element>(
         return Ok(array.clone());
     }
     let py = given.py();
-    if given.get_type().name()?.to_cow()? == "MaskedArray" {
+    if is_masked(given, DEEPEST)? {
         return Err(expected(
             place,
             what,
@@ -53,7 +54,39 @@ fn array<'py, T: Element>(
     Ok(made.cast_into::<PyArrayDyn<T>>()?)
 }
 
-fn first_line(text: &str) -> String {
+/// Whether something is masked: an array of numpy's `ma`, or one of the items of a list.
+fn is_masked(given: &Bound<'_, PyAny>, left: usize) -> PyResult<bool> {
+    static MASKED: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
+    if given.is_exact_instance_of::<PyFloat>() || given.cast_exact::<PyUntypedArray>().is_ok() {
+        return Ok(false);
+    }
+    let Some(left) = left.checked_sub(1) else { return Ok(false) };
+    if let Ok(list) = given.cast::<PyList>() {
+        return any_masked(list.iter(), left);
+    }
+    if let Ok(tuple) = given.cast::<PyTuple>() {
+        return any_masked(tuple.iter(), left);
+    }
+    let py = given.py();
+    let class = || Ok::<_, PyErr>(numpy(py, "ma")?.getattr("MaskedArray")?.unbind());
+    given.is_instance(MASKED.get_or_try_init(py, class)?.bind(py))
+}
+
+fn any_masked<'py>(
+    mut items: impl Iterator<Item = Bound<'py, PyAny>>,
+    left: usize,
+) -> PyResult<bool> {
+    items.try_fold(false, |found, item| Ok(found || is_masked(&item, left)?))
+}
+
+/// Whether something is an array of complex numbers, or what numpy makes one of.
+pub fn is_complex(given: &Bound<'_, PyAny>) -> bool {
+    let found = numpy(given.py(), "iscomplexobj").and_then(|f| f.call1((given,))?.is_truthy());
+    found.unwrap_or(false)
+}
+
+/// The first line of a text.
+pub fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 

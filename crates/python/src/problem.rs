@@ -11,9 +11,10 @@ use nonsmooth_problem::{
 use nonsmooth_solve::{Kept, Limits};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use pyo3::{PyTraverseError, PyVisit};
 
-use crate::function::{self, Faults};
-use crate::parts::{Given, Shown};
+use crate::function::{self, Faults, Functions};
+use crate::parts::{Given, Shown, put, put_bound};
 use crate::{contact, expected, mistake, numbers};
 
 /// A problem of any kind, with what a file says of it.
@@ -24,11 +25,24 @@ pub struct Problem {
     kept: Mutex<Kept>,
     /// Where exceptions of its functions go.
     pub faults: Arc<Faults>,
+    /// Its functions of Python, for the garbage collector.
+    functions: Option<Py<Functions>>,
 }
 
 impl Problem {
-    pub fn new(file: ProblemFile, faults: Arc<Faults>) -> Self {
-        Self { file: RwLock::new(Arc::new(file)), kept: Mutex::new(Kept::default()), faults }
+    /// Of a file, without functions of Python.
+    pub fn new(file: ProblemFile) -> Self {
+        Self {
+            file: RwLock::new(Arc::new(file)),
+            kept: Mutex::default(),
+            faults: Arc::default(),
+            functions: None,
+        }
+    }
+
+    /// What the garbage collector knows of its functions, for who keeps the problem.
+    pub fn functions(&self, py: Python<'_>) -> Option<Py<Functions>> {
+        self.functions.as_ref().map(|functions| functions.clone_ref(py))
     }
 
     /// The problem as it is now; who has it keeps it, whatever becomes of this.
@@ -95,8 +109,12 @@ pub fn kinds(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     Ok(all)
 }
 
-/// The problem of a kind by its parts.
-fn stated(kind: &str, parts: &Bound<'_, PyDict>, faults: &Arc<Faults>) -> PyResult<AnyProblem> {
+/// The problem of a kind by its parts, and its functions of Python.
+fn stated(
+    kind: &str,
+    parts: &Bound<'_, PyDict>,
+    faults: &Arc<Faults>,
+) -> PyResult<(AnyProblem, Option<Functions>)> {
     let known = known().find(|known| known.kind.name() == kind);
     let Some(Known { kind, parts: letters_of, make, .. }) = known else {
         return Err(expected("kind", "a kind of problem that is stated by parts", kind));
@@ -107,7 +125,7 @@ fn stated(kind: &str, parts: &Bound<'_, PyDict>, faults: &Arc<Faults>) -> PyResu
         Some(f) if f.is_callable() => by_function(kind, parts, &f, &all, faults),
         _ => {
             let problem = make(&mut given);
-            given.made(problem, &all)
+            Ok((given.made(problem, &all)?, None))
         }
     }
 }
@@ -119,7 +137,7 @@ fn by_function(
     f: &Bound<'_, PyAny>,
     letters: &[&'static str],
     faults: &Arc<Faults>,
-) -> PyResult<AnyProblem> {
+) -> PyResult<(AnyProblem, Option<Functions>)> {
     let mut given = Given::new(parts);
     given.get("F")?;
     let start = match given.get("start")? {
@@ -137,10 +155,11 @@ fn by_function(
     if let Some(jacobian) = jacobian.as_ref().filter(|jacobian| !jacobian.is_callable()) {
         return Err(expected("jac", "a function", crate::parts::type_name(jacobian)));
     }
-    let field = function::field(f, jacobian.as_ref(), pattern.as_ref(), &start, faults)?;
+    let (field, functions) =
+        function::field(f, jacobian.as_ref(), pattern.as_ref(), &start, faults)?;
     let mut all = letters.to_vec();
     all.extend(["jac", "pattern"]);
-    Ok(match kind {
+    let problem = match kind {
         Kind::Vi => {
             let set = crate::parts::set("set", &given.need("set")?)?;
             given.made(Vi::of(field, set, start), &all)?.into()
@@ -150,7 +169,8 @@ fn by_function(
             let upper = given.vector_or("upper", n, f64::INFINITY)?;
             given.made(Mcp::of(field, lower, upper, start), &all)?.into()
         }
-    })
+    };
+    Ok((problem, Some(functions)))
 }
 
 /// The parts of a problem that have something to show.
@@ -163,14 +183,6 @@ fn shown(problem: &AnyProblem) -> Vec<(&'static str, Shown<'_>)> {
             parts.into_iter().filter_map(shown).collect()
         }
     }
-}
-
-/// Puts a vector that is given in the place of another.
-fn put(given: &mut Given<'_, '_>, name: &'static str, into: &mut Vec<f64>) -> PyResult<()> {
-    if let Some(new) = given.get(name)? {
-        *into = numbers::vector(name, &new)?;
-    }
-    Ok(())
 }
 
 /// The same problem with other parts; a function of Python stays as it is.
@@ -189,8 +201,9 @@ fn changed(problem: &AnyProblem, parts: &Bound<'_, PyDict>) -> PyResult<AnyProbl
         }
         AnyProblem::Complementarity(Complementarity::Mcp(p)) if p.F.expressions().is_none() => {
             let (mut given, mut other) = (Given::new(parts), p.clone());
-            put(&mut given, "lower", &mut other.lower)?;
-            put(&mut given, "upper", &mut other.upper)?;
+            let n = other.start.len();
+            put_bound(&mut given, "lower", n, &mut other.lower)?;
+            put_bound(&mut given, "upper", n, &mut other.upper)?;
             put(&mut given, "start", &mut other.start)?;
             let valid = other.validate();
             given.made(valid, &["lower", "upper", "start"])?;
@@ -216,23 +229,29 @@ fn changed(problem: &AnyProblem, parts: &Bound<'_, PyDict>) -> PyResult<AnyProbl
 impl Problem {
     /// A problem of a kind that is stated by parts.
     #[staticmethod]
-    fn stated(kind: &str, parts: &Bound<'_, PyDict>) -> PyResult<Self> {
+    fn stated(py: Python<'_>, kind: &str, parts: &Bound<'_, PyDict>) -> PyResult<Self> {
         let faults = Arc::new(Faults::default());
-        Ok(Self::new(ProblemFile::new(stated(kind, parts, &faults)?), faults))
+        let (problem, functions) = stated(kind, parts, &faults)?;
+        let functions = functions.map(|functions| Py::new(py, functions)).transpose()?;
+        Ok(Self { faults, functions, ..Self::new(ProblemFile::new(problem)) })
+    }
+
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.functions)
     }
 
     /// A problem of contacts.
     #[staticmethod]
     #[pyo3(signature = (parts, dimension=None))]
     fn friction(parts: &Bound<'_, PyDict>, dimension: Option<usize>) -> PyResult<Self> {
-        Ok(Self::new(ProblemFile::new(contact::made(parts, dimension)?), Arc::default()))
+        Ok(Self::new(ProblemFile::new(contact::made(parts, dimension)?)))
     }
 
     /// The problem in a file of any format.
     #[staticmethod]
     fn read(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
         let file = py.detach(|| ProblemFile::read(path)).map_err(mistake)?;
-        Ok(Self::new(file, Arc::default()))
+        Ok(Self::new(file))
     }
 
     /// Writes the problem, with a solution if there is one, in the format of the extension.
@@ -285,6 +304,15 @@ impl Problem {
     #[getter]
     fn unknowns(&self) -> usize {
         self.file().problem.unknowns()
+    }
+
+    /// The number of contacts, or of pairs where there are no contacts.
+    #[getter]
+    fn pairs(&self) -> usize {
+        match &self.file().problem {
+            AnyProblem::Friction(friction) => friction.contacts(),
+            AnyProblem::Complementarity(stated) => with_complementarity!(stated, p => p.pairs()),
+        }
     }
 
     /// The number of contacts; `None` where there are no contacts but pairs.
@@ -345,11 +373,12 @@ impl Problem {
     }
 
     /// Another problem, as this is now: to change one leaves the other as it is. A function of Python is the same.
-    fn copy(&self) -> Self {
+    fn copy(&self, py: Python<'_>) -> Self {
         Self {
             file: RwLock::new(self.file()),
-            kept: Mutex::new(Kept::default()),
+            kept: Mutex::default(),
             faults: self.faults.clone(),
+            functions: self.functions(py),
         }
     }
 

@@ -56,7 +56,17 @@ impl Runs {
             let known = Cost::ALL.map(Cost::name).join(", ");
             return Err(expected("cost", &format!("one of {known}"), cost));
         };
-        let costs = Costs::of(&self.0, &Selection::at(kind, tolerance), cost);
+        let of_kind = self.0.runs.iter().filter(|run| run.kind == kind).map(|run| run.tolerance);
+        let mut there: Vec<f64> = of_kind.collect();
+        if !there.contains(&tolerance) {
+            there.sort_by(f64::total_cmp);
+            there.dedup();
+            let there: Vec<_> = there.iter().map(|t| format!("{t:e}")).collect();
+            let what = format!("a tolerance of the runs ({})", there.join(", "));
+            return Err(expected("tol", &what, format!("{tolerance:e}")));
+        }
+        // A solver that does not count this cost would seem to fail.
+        let (costs, _) = Costs::of(&self.0, &Selection::at(kind, tolerance), cost).counted();
         let curves = profile::performance(&costs);
         Ok(curves.into_iter().map(|curve| (curve.solver, curve.steps)).collect())
     }

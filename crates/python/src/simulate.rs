@@ -172,7 +172,7 @@ impl Simulation {
     /// The contact problem of the next step of length h; `None` where nothing touches.
     fn problem(&self, h: f64) -> PyResult<Option<crate::problem::Problem>> {
         let problem = self.with(|s| s.problem(h).map_err(mistake))?;
-        Ok(problem.map(|p| crate::problem::Problem::new(ProblemFile::new(p), Arc::default())))
+        Ok(problem.map(|p| crate::problem::Problem::new(ProblemFile::new(p))))
     }
 
     /// Moves on until a time, in steps of h, a frame every so many; `callback` is called with each step.

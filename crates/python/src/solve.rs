@@ -15,9 +15,10 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use pyo3::{PyTraverseError, PyVisit};
 use pythonize::pythonize;
 
-use crate::function::Watcher;
+use crate::function::{Functions, Watcher};
 use crate::problem::{Problem, point};
 use crate::wait::{TICK, ask, elsewhere};
 use crate::{mistake, registry};
@@ -150,19 +151,24 @@ pub fn solve(
     });
     drop(watching);
     problem.put_kept(kept);
+    let functions = problem.functions(py);
     if let Some(fault) = watcher.fault() {
         // What Ctrl-C ended is not lost.
         if let (true, Ok(answer)) = (fault.is_instance_of::<PyKeyboardInterrupt>(py), solved) {
-            fault.value(py).setattr("answer", Bound::new(py, Answer { answer, file })?)?;
+            let answer = Bound::new(py, Answer { answer, file, functions })?;
+            fault.value(py).setattr("answer", answer)?;
         }
         return Err(fault);
     }
-    let answer = solved.map_err(mistake)?;
+    let mut answer = solved.map_err(mistake)?;
+    if !answer.is_solved() {
+        answer.account.extend(watcher.undefined());
+    }
     // A signal that came in the last moment.
     if answer.status == Status::Limit(Limit::Cancelled) {
         py.check_signals()?;
     }
-    Ok(Answer { answer, file })
+    Ok(Answer { answer, file, functions })
 }
 
 /// What came of a solve; `nonsmooth.Answer` has the words.
@@ -172,6 +178,8 @@ pub struct Answer {
     pub answer: nonsmooth_solve::Answer<AnyProblem>,
     /// The problem that it was.
     pub file: Arc<ProblemFile>,
+    /// Its functions of Python, for the garbage collector.
+    functions: Option<Py<Functions>>,
 }
 
 /// Arrays by their names.
@@ -188,6 +196,10 @@ pub fn arrays<'py>(
 
 #[pymethods]
 impl Answer {
+    fn __traverse__(&self, visit: PyVisit<'_>) -> Result<(), PyTraverseError> {
+        visit.call(&self.functions)
+    }
+
     /// The status by its short name.
     #[getter]
     fn status(&self) -> &'static str {

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from conftest import local, spd
 
 import nonsmooth as ns
+from nonsmooth.comparing import Profile
 
 
 @pytest.fixture(scope="module")
@@ -58,3 +61,52 @@ def test_problems_from_files_and_mistakes(tmp_path):
     assert [row["problem"] for row in runs.rows] == ["a", "problem1"]
     with pytest.raises(ns.Error, match="did you mean `lemke`"):
         ns.bench([], ["lemk"])
+
+
+def lines(*runs):
+    """A file of runs on one kind of problem."""
+    head = {"line": "campaign", "format": "nonsmooth-runs", "version": 1, "id": "c", "program": "p", "machine": {"cpu": "x"}}
+    usual = {"line": "run", "campaign": "c", "family": "f", "kind": "lcp", "contacts": 2, "tolerance": 1e-8}
+    usual.update(ending="solved", seconds=1.0, iterations=3)
+    return "".join(json.dumps(line) + "\n" for line in [head, *({**usual, **run} for run in runs)])
+
+
+def test_who_does_not_report_a_cost_is_in_no_profile_of_it(tmp_path):
+    both = [{"problem": f"f/{k}", "solver": s} for k in range(2) for s in "AB"]
+    counted = [{**run, "factorisations": 2} if run["solver"] == "A" else run for run in both]
+    (tmp_path / "runs.jsonl").write_text(lines(*counted))
+    runs = ns.read_runs(tmp_path / "runs.jsonl")
+    assert list(runs.profile("factorisations").curves) == ["A"]
+    assert set(runs.profile("iterations").curves) == {"A", "B"}
+
+
+def test_a_profile_is_at_a_tolerance_of_the_runs(runs):
+    with pytest.raises(ns.Error, match=r"tol: expected a tolerance of the runs .1e-8, 1e-4., found 1e-5"):
+        runs.profile(tol=1e-5)
+    with pytest.raises(ns.Error, match="tol: expected a number, found 'a'"):
+        runs.profile(tol="a")
+
+
+@pytest.mark.parametrize("many", [2, 30])
+def test_profiles_begin_at_one_and_names_do_not_hide_them(many):
+    pytest.importorskip("matplotlib").use("Agg")
+    profile = Profile({f"solver{k}": [(1.5, 0.5), (2.0 + k, 1.0)] for k in range(many)}, "seconds")
+    axes = profile.plot()
+    for line in axes.lines:
+        assert (line.get_xdata()[0], line.get_ydata()[0]) == (1.0, 0.0)
+    axes.figure.canvas.draw()
+    names, box = axes.get_legend().get_window_extent(), axes.get_window_extent()
+    assert (names.x0 > box.x1) == (many == 30) and names.x1 <= axes.figure.bbox.x1
+    assert box.width > 300
+
+
+def test_runs_have_the_words_of_the_command_line(tmp_path):
+    mixed = ns.MLCP([[2.0, 1.0], [1.0, 2.0]], [-1.0, -1.0], 1)
+    contact = ns.Friction(W=np.eye(3), q=[-1.0, 2.0, 1.5], mu=0.5)
+    solvers = (solver for solver in (ns.Auto(interior=False), "auto"))
+    runs = ns.bench([mixed, contact], solvers, repeats=0)
+    assert len(runs) == 4
+    assert {row["solver"] for row in runs.rows} == {"auto:interior=false", "auto"}
+    # Pairs, not variables.
+    assert [row["contacts"] for row in runs.rows] == [1, 1, 1, 1]
+    assert "residuals" not in runs.to_pandas() and "relative" in runs.to_pandas()

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextvars
+import copy
+import gc
 import threading
 import time
+import weakref
 
 import numpy as np
 import pytest
@@ -318,3 +321,101 @@ def test_sets_and_settings_within_themselves_are_refused():
         ns.VI(lambda x: x, ns.SecondOrderCone(-1), [0.0])
     with pytest.raises(ns.Error, match="set.radius: expected a number, found 'a'"):
         ns.VI(lambda x: x, ns.Ball([0, 0], "a"), [0.0, 0.0])
+
+
+def tripping(fault, after=3):
+    """A problem whose F fails once it has been called so often."""
+    calls = 0
+
+    def F(x):
+        nonlocal calls
+        calls += 1
+        if calls > after:
+            return fault()
+        return x**3 - 1
+
+    return ns.MCP(F, [5.0], jac=lambda x: np.diag(3 * x**2))
+
+
+def raising(fault):
+    raise fault
+
+
+@pytest.mark.parametrize("solver", ["semismooth", "path", "auto", "newton_min"])
+@pytest.mark.parametrize("after", range(1, 6))
+def test_what_says_nothing_of_x_is_raised_wherever_it_comes_up(solver, after):
+    for fault, kind, said in (
+        (lambda: raising(MemoryError("none left")), MemoryError, "none left"),
+        (lambda: raising(RecursionError("too deep")), RecursionError, "too deep"),
+        (lambda: nobody_knows_this, NameError, "nobody_knows_this"),  # noqa: F821
+        (lambda: np.zeros(7), ns.Error, r"F\(x\): expected 1 values, found 7"),
+        (lambda: None, ns.Error, r"F\(x\): expected"),
+    ):
+        with pytest.raises(kind, match=said):
+            ns.solve(tripping(fault, after), solver)
+
+
+def test_an_unsolved_answer_names_the_first_point_that_was_none():
+    def F(x):
+        if x[0] != 4.0:
+            raise ValueError("no such temperature\nindeed")
+        return [0.5]
+
+    problem = ns.MCP(F, [4.0], lower=-np.inf, jac=lambda x: [[1.0]])
+    for solver in ("auto", "path", "semismooth"):
+        answer = ns.solve(problem, solver)
+        (said,) = [line for line in answer.account if "raised" in line]
+        assert not answer.solved and said.startswith("F or jac raised at ")
+        assert said.endswith("; first ValueError: no such temperature")
+
+
+def test_where_numbers_become_complex_a_function_is_not_defined():
+    def F(x):
+        # Of Python's numbers, the root of a negative one.
+        return [4 * float(x[0]) ** 0.5 - 0.4]
+
+    problem = ns.MCP(F, [4.0], lower=-np.inf, pattern=[[1]])
+    answer = ns.solve(problem)
+    assert answer.x == pytest.approx([0.01], abs=1e-6)
+    assert not [line for line in answer.account if "raised" in line]
+
+
+class Model:
+    """Holds a problem whose functions are its own."""
+
+    def __init__(self):
+        self.problem = ns.MCP(self.F, [0.0], jac=self.J)
+        self.answer = self.copied = None
+
+    def F(self, x):
+        return x - 1
+
+    def J(self, x):
+        return np.eye(1)
+
+
+@pytest.mark.parametrize("held", ["problem", "answer", "copy", "all"])
+def test_an_object_whose_functions_are_its_problem_is_freed(held):
+    gone = []
+    for _ in range(5):
+        model = Model()
+        model.answer, model.copied = ns.solve(model.problem), copy.copy(model.problem)
+        assert model.answer.solved and ns.solve(model.copied).solved
+        # What is kept alone keeps the functions.
+        if held in ("answer", "copy"):
+            model.problem = None
+            gc.collect()
+        if held in ("problem", "copy"):
+            model.answer = None
+        if held in ("problem", "answer"):
+            model.copied = None
+        if held == "copy":
+            assert ns.solve(model.copied).x == pytest.approx([1.0])
+        gone.append(weakref.ref(model))
+        del model
+    gc.collect()
+    assert [model() for model in gone] == [None] * 5
+    # The problem alone keeps what it needs.
+    problem = Model().problem
+    gc.collect()
+    assert ns.solve(problem).x == pytest.approx([1.0])

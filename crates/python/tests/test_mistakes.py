@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -347,3 +349,51 @@ def test_wrong_objects_are_named():
     with pytest.raises(TypeError, match="expected one of its kinds"):
         ns.Problem()
     assert scene.copy() is not scene
+
+
+class Masked(np.ma.MaskedArray):
+    """A class of its own."""
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        np.ma.masked,
+        np.ma.masked_array([0.1], [1]),
+        Masked([0.1], mask=[1]),
+        [np.ma.masked],
+        (np.ma.masked_array(0.1, True),),
+    ],
+    ids=["masked", "array", "subclass", "list", "tuple"],
+)
+def test_masks_of_any_kind_are_refused(given):
+    for make in (
+        lambda: ns.Friction(W=EYE, q=[-1.0, 0.0, 0.0], mu=given),
+        lambda: ns.BoxLCP([[1.0]], [1.0], given),
+        lambda: ns.MCP(["x1"], [0.0], lower=given),
+        lambda: ns.LCP([given], [1.0]),
+    ):
+        with pytest.raises(ns.Error, match=r"(mu|lower|M): expected .*, found a masked array"):
+            make()
+
+
+def test_dimensions_that_are_none_are_refused():
+    for wrong in (7, "3", -1, 2.5, [2, 3]):
+        with pytest.raises(ns.Error, match="dimension: expected one of 2, 3, found"):
+            ns.Friction(W=EYE, q=[-1.0, 0.0, 0.0], mu=0.5, dimension=wrong)
+    with pytest.raises(ns.Error, match="dimension: expected one of 2, 3, 5, found 4"):
+        ns.Friction(W=np.eye(5), q=np.zeros(5), mu=0.5, mu_r=0.1, dimension=4)
+    assert ns.Friction(W=EYE, q=[-1.0, 0.0, 0.0], mu=0.5, dimension=np.int64(3)).dimension == 3
+
+
+def test_a_prefix_without_a_usual_solver_asks_for_one():
+    for offer in ns._nonsmooth.offers():
+        for prefix in offer["prefixes"]:
+            made = ns.settings.CLASSES[ns.settings.class_name(prefix["name"])]
+            required = inspect.signature(made).parameters["solver"].default is inspect.Parameter.empty
+            if required:
+                with pytest.raises(TypeError, match="expected a solver behind the prefix"):
+                    made()
+            else:
+                assert made().name == f"{prefix['name']}/auto"
+            assert required == (made.__name__ not in ("Condense", "Glocker", "Multipliers", "Ncp"))

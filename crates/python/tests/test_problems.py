@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import multiprocessing
 import pickle
+from concurrent.futures import ProcessPoolExecutor
 
 import numpy as np
 import pytest
@@ -377,3 +378,69 @@ def test_velocities_that_are_not_given_follow_from_the_impulses(tmp_path):
     assert not problem.judge({"r": answer.r, "v": np.zeros(3)})["solved"]
     problem.save(tmp_path / "slides.hdf5", answer.r)
     assert np.allclose(ns.read(tmp_path / "slides.hdf5").solution["v"], answer.v)
+
+
+def work(k):
+    """What ends in an exception, in another process."""
+    problem = ns.LCP([[0.0]], [-1.0])
+    return ns.solve(problem).raise_if_unsolved() if k == 0 else ns.solve(problem, "nonsense")
+
+
+def test_exceptions_come_from_another_process():
+    with ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as pool:
+        with pytest.raises(ns.Unsolved, match="infeasible") as caught:
+            pool.submit(work, 0).result()
+        assert caught.value.answer.status is ns.Status.INFEASIBLE
+        with pytest.raises(ns.Error, match="unknown solver `nonsense`"):
+            pool.submit(work, 1).result()
+    with pytest.raises(ns.Error) as caught:
+        work(1)
+    for again in (copy.copy(caught.value), copy.deepcopy(caught.value), pickle.loads(pickle.dumps(caught.value))):
+        assert type(again) is ns.Error and again.args == caught.value.args
+    assert (ns.Error.__module__, ns.Error.__qualname__) == ("nonsmooth", "Error")
+
+
+def test_every_contact_is_drawn():
+    pytest.importorskip("matplotlib").use("Agg")
+    from nonsmooth import plots
+
+    # Pushed just as much as friction holds: it rests at the limit.
+    edge = ns.Friction(W=np.eye(6), q=[-1.0, 0.5, 0.0, -1.0, 0.1, 0.0], mu=0.5)
+    answer = ns.solve(edge, tol=1e-12)
+    assert set(answer.contacts["status"]) == {"stick at limit", "stick"}
+    for colours in (plots.COLOURS, {}):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(plots, "COLOURS", colours)
+            *statuses, cone = plots.cone(answer).lines
+        assert sorted(line.get_label() for line in statuses) == ["stick (1)", "stick at limit (1)"]
+        assert sum(len(line.get_xdata()) for line in statuses) == 2
+
+
+def test_names_of_digits_are_names(tmp_path):
+    names = ["007", "²", "1"]
+    ns.LCP(np.eye(3), -np.ones(3)).save(tmp_path / "p.toml")
+    text = (tmp_path / "p.toml").read_text()
+    (tmp_path / "p.toml").write_text(f"names = {names}\n".replace("'", '"') + text)
+    named = ns.read(tmp_path / "p.toml")
+    assert named.names == names
+    table = ns.solve(named).table
+    assert table["name"].tolist() == names and table["variable"].tolist() == [0, 1, 2]
+
+
+def test_parts_are_changed_as_they_are_given_at_first():
+    for problem in (
+        ns.MCP(["x1 - 2", "x2"], [0.0, 0.0]),
+        ns.MCP(lambda x: x - 2, [0.0, 0.0]),
+        ns.BoxLCP(np.eye(2), [1.0, 1.0]),
+    ):
+        problem.update(lower=-3.0, upper=np.float64(1.5))
+        assert problem.lower.tolist() == [-3.0, -3.0] and problem.upper.tolist() == [1.5, 1.5]
+    larger = ns.BoxLCP(np.eye(2), [1.0, 1.0])
+    larger.update(M=np.eye(3), q=np.ones(3), lower=-1.0, upper=1.0)
+    assert larger.lower.tolist() == [-1.0] * 3
+    rows = ns.Friction(R=np.eye(2), s=[-1.0, -1.0], lower=0.0)
+    rows.update(upper=0.5)
+    assert rows.lower.tolist() == [0.0, 0.0] and rows.upper.tolist() == [0.5, 0.5]
+    for problem in (ns.MCP(lambda x: x, [0.0]), ns.VI(["x1"], ns.Ball([0.0], 1.0), [0.0])):
+        problem.update(x0=[0.25])
+        assert problem.start.tolist() == [0.25]

@@ -347,3 +347,25 @@ def test_contacts_without_a_law_of_their_own_may_give_way():
     world.sphere(0.1, mass=2, inertia=[0.01] * 3, position=[0, 0, 0.1])
     run = ns.Simulation(world).run(3.0)
     assert run.position[-1, 1, 2] == pytest.approx(0.1 - 2 * 9.81 / 1e4, abs=1e-9)
+
+
+def test_names_that_are_made_are_free():
+    world = ns.World()
+    assert world.sphere(0.1, name="body1", density=1.0) == "body1"
+    made = [world.sphere(0.1, density=1.0, position=[0, 0, k]) for k in (1, 2)]
+    assert made == ["body2", "body3"]
+    assert world.joint("fixed", *made, name="joint1") == "joint1"
+    assert world.joint("fixed", "world", made[0]) == "joint2"
+    world.pair("default", mu=0.3)
+    ns.Simulation(world)
+
+
+def test_a_run_without_steps_stays_what_it_was():
+    world = ns.World()
+    world.sphere(0.1, density=1.0)
+    world.pair("default", mu=0.3)
+    simulation = ns.Simulation(world)
+    simulation.run(0.01)
+    none = simulation.run(0.005)
+    simulation.run(0.02)
+    assert repr(none) == "<Run: 1 bodies, 0 steps to t = 0.01 s, solved>"

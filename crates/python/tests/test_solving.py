@@ -49,6 +49,26 @@ def test_settings_are_typed_and_documented(box):
         ns.solve(box, "nsgs", omgea=1)
 
 
+def test_defaults_are_those_of_the_kind():
+    # By contacts armijo, by pairs nonmonotone.
+    assert ns.NewtonFb().line_search is None and ns.NewtonFb().rho == 1.0
+    assert inspect.signature(ns.NewtonFb).parameters["line_search"].default is None
+    assert "'nonmonotone'\n    for lcp, mlcp" in ns.NewtonFb.__doc__
+    solver = ns.NewtonFb(line_search="armijo", rho=None)
+    assert solver.settings == {"line_search": "armijo"}
+    solver.line_search = None
+    assert solver == ns.NewtonFb()
+    # Each default may be said.
+    for made in ns.settings.CLASSES.values():
+        for name, parameter in inspect.signature(made).parameters.items():
+            if parameter.default is not inspect.Parameter.empty and not issubclass(made, ns.settings.Prefixed):
+                assert getattr(made(**{name: parameter.default}), name) == parameter.default
+    problem = ns.LCP(spd(6), -np.ones(6))
+    assert ns.solve(problem, "newton_fb", line_search=None).iterations == ns.solve(problem, "newton_fb").iterations
+    with pytest.raises(ns.Error, match="line_search"):
+        ns.solve(problem, "newton_fb", linesearch=None)
+
+
 def test_prefixes_are_objects_too(box):
     proximal = ns.Proximal(ns.Nsgs(omega=0.9), prox_rule="residual")
     assert proximal.name == "proximal/nsgs" and ns.solve(box, proximal).solved

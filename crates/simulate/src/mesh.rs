@@ -10,7 +10,7 @@ use crate::error::{finite, require};
 
 /// The most open edges that a message names.
 const NAMED: usize = 5;
-/// Triangles whose area is below this share of the square of the size are left out.
+/// Triangles whose area is below this share of the square of the size have none.
 const SLIVER: f64 = 1e-14;
 
 /// Triangles about common vertices.
@@ -18,11 +18,13 @@ const SLIVER: f64 = 1e-14;
 pub struct Mesh {
     vertices: Vec<Vec3>,
     triangles: Vec<[u32; 3]>,
+    open: Vec<[u32; 2]>,
     one_sided: bool,
 }
 
 impl Mesh {
-    /// Of vertices (m) and triangles, counter-clockwise seen from outside. Vertices at the same place become one, triangles without area are left out.
+    /// Of vertices (m) and triangles, counter-clockwise seen from outside. Vertices at the same place become one; of a triangle without area the corner between the other two goes to the triangle
+    /// across from it, which is cut in two there, and where there is none the triangle is left out.
     /// The mesh is [closed](Self::open_edges) or a sheet that is met from both sides. Cost: n log n.
     ///
     /// Errors: coordinates that are not finite, vertices that there are not, no triangle with an area.
@@ -50,19 +52,19 @@ impl Mesh {
                 let expected = format!("vertices below {}", index.len());
                 return Err(SimulateError::value(format!("triangles[{k}]"), expected, bad));
             }
-            let t = t.map(|v| index[v]);
-            let [p, q, r] = t.map(|v| kept[v as usize]);
-            if norm(cross(sub(q, p), sub(r, p))) > SLIVER * size * size {
-                all.push(t);
+            let [a, b, c] = t.map(|v| index[v]);
+            if a != b && b != c && c != a {
+                all.push([a, b, c]);
             }
         }
+        let open = open_edges(&all);
+        give_corners_away(&mut all, &kept, SLIVER * size * size);
         if all.is_empty() {
             let found = format!("{} without", triangles.len());
             return Err(SimulateError::value("triangles", "one with an area at least", found));
         }
-        let mut mesh = Self { vertices: kept, triangles: all, one_sided: false };
-        mesh.one_sided = mesh.open_edges().is_empty();
-        Ok(mesh)
+        let one_sided = open.is_empty();
+        Ok(Self { vertices: kept, triangles: all, open, one_sided })
     }
 
     /// The ground below heights (m) at the knots of a grid, row by row along the second axis, that spans `size` (m) about the origin. Solid below: what has sunk in is
@@ -116,16 +118,9 @@ impl Mesh {
         self.one_sided
     }
 
-    /// The edges that do not have exactly one triangle on either side, in the sense of a triangle; none of a closed mesh. Cost: n log n.
-    pub fn open_edges(&self) -> Vec<[u32; 2]> {
-        let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
-        for [a, b, c] in &self.triangles {
-            for edge in [[*a, *b], [*b, *c], [*c, *a]] {
-                *count.entry(edge).or_default() += 1;
-            }
-        }
-        let paired = |[i, j]: [u32; 2]| count[&[i, j]] == 1 && count.get(&[j, i]) == Some(&1);
-        count.keys().copied().filter(|e| !paired(*e)).collect()
+    /// The edges that do not have exactly one triangle on either side, in the sense of a triangle; none of a closed mesh.
+    pub fn open_edges(&self) -> &[[u32; 2]] {
+        &self.open
     }
 
     /// Mass, mass centre and inertia of the solid inside for a density in kg/m³, exact: the signed sum of tetrahedra between a point and the triangles.
@@ -158,10 +153,126 @@ impl Mesh {
     }
 }
 
+/// The edges of a triangle, in its sense.
+fn edges([a, b, c]: [u32; 3]) -> [[u32; 2]; 3] {
+    [[a, b], [b, c], [c, a]]
+}
+
+/// The edges that do not have exactly one triangle on either side. Cost: n log n.
+fn open_edges(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
+    let mut count: BTreeMap<[u32; 2], u32> = BTreeMap::new();
+    for edge in triangles.iter().copied().flat_map(edges) {
+        *count.entry(edge).or_default() += 1;
+    }
+    let paired = |[i, j]: [u32; 2]| count[&[i, j]] == 1 && count.get(&[j, i]) == Some(&1);
+    count.keys().copied().filter(|e| !paired(*e)).collect()
+}
+
+/// Takes away the triangles whose area is not above `least`, twice that; the corner between the two others cuts the triangle on the other side of the long edge in two, so that a surface that was closed
+/// stays so. Cost: n log n where there are any.
+fn give_corners_away(triangles: &mut Vec<[u32; 3]>, vertices: &[Vec3], least: f64) {
+    let at = |v: u32| vertices[v as usize];
+    let is_flat = |[p, q, r]: [u32; 3]| norm(cross(sub(at(q), at(p)), sub(at(r), at(p)))) <= least;
+    let mut flat: Vec<usize> = (0..triangles.len()).filter(|&k| is_flat(triangles[k])).collect();
+    if flat.is_empty() {
+        return;
+    }
+    let mut of_edge = BTreeMap::new();
+    for (k, t) in triangles.iter().enumerate() {
+        edges(*t).into_iter().for_each(|edge| {
+            of_edge.insert(edge, k);
+        });
+    }
+    let mut gone = vec![false; triangles.len()];
+    // Each turn gives one away; flat ones beside each other may hand theirs on.
+    for _ in 0..4 * flat.len() {
+        let Some(k) = flat.pop() else { break };
+        if gone[k] {
+            continue;
+        }
+        let longest = edges(triangles[k]).into_iter().zip([2, 0, 1]);
+        let length = |[i, j]: [u32; 2]| norm(sub(at(i), at(j)));
+        let Some(([c, a], middle)) = longest.max_by(|x, y| length(x.0).total_cmp(&length(y.0)))
+        else {
+            break;
+        };
+        let b = triangles[k][middle];
+        let across = of_edge.get(&[a, c]).copied().filter(|&other| other != k && !gone[other]);
+        let Some(other) = across else {
+            gone[k] = true;
+            continue;
+        };
+        let Some(&d) = triangles[other].iter().find(|v| **v != a && **v != c) else { break };
+        if d == b {
+            // Two on top of each other.
+            (gone[k], gone[other]) = (true, true);
+            continue;
+        }
+        (triangles[k], triangles[other]) = ([a, b, d], [b, c, d]);
+        for place in [k, other] {
+            edges(triangles[place]).into_iter().for_each(|edge| {
+                of_edge.insert(edge, place);
+            });
+            if is_flat(triangles[place]) {
+                flat.push(place);
+            }
+        }
+    }
+    flat.into_iter().for_each(|k| gone[k] = true);
+    let mut gone = gone.into_iter();
+    triangles.retain(|_| gone.next() == Some(false));
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use nonsmooth_scenes::Polyhedron;
+
+    /// A cube with corners in the middle of edges, whose faces meet there in triangles without area: closed, and as heavy.
+    #[test]
+    fn corners_on_edges_leave_a_mesh_closed() {
+        let p = Polyhedron::cuboid([1.0, 1.0, 1.0]).unwrap();
+        let mut vertices = p.vertices().to_vec();
+        for several in [1, 3] {
+            let mut triangles: Vec<[usize; 3]> = vec![];
+            for (k, face) in p.faces().iter().enumerate() {
+                let edge = |a: usize, b: usize| (face[a], face[b]);
+                let (a, b) = edge(0, 1);
+                if k == 0 {
+                    // A fan from a over points of its own edge: triangles without area first.
+                    let mut fan = vec![a];
+                    for i in 1..=several {
+                        let part = i as f64 / (several + 1) as f64;
+                        let (x, y) = (p.vertices()[a], p.vertices()[b]);
+                        vertices.push([0, 1, 2].map(|k| x[k] + part * (y[k] - x[k])));
+                        fan.push(vertices.len() - 1);
+                    }
+                    fan.extend(&face[1..]);
+                    triangles.extend((1..fan.len() - 1).map(|i| [fan[0], fan[i], fan[i + 1]]));
+                } else {
+                    triangles.extend([[a, b, face[2]], [a, face[2], face[3]]]);
+                }
+            }
+            // The neighbour knows nothing of the points: an open edge unless they are its own, too.
+            assert!(!Mesh::new(&vertices, &triangles).unwrap().is_one_sided());
+            let (a, b) = (p.faces()[0][0], p.faces()[0][1]);
+            let points: Vec<usize> = (vertices.len() - several..vertices.len()).collect();
+            let k = triangles
+                .iter()
+                .position(|t| edges(t.map(|v| v as u32)).contains(&[b as u32, a as u32]))
+                .unwrap();
+            let c = *triangles[k].iter().find(|v| **v != a && **v != b).unwrap();
+            triangles.remove(k);
+            let chain =
+                [&[b][..], &points.iter().rev().copied().collect::<Vec<_>>(), &[a]].concat();
+            triangles.extend(chain.windows(2).map(|w| [w[0], w[1], c]));
+            let mesh = Mesh::new(&vertices, &triangles).unwrap();
+            assert!(mesh.is_one_sided() && open_edges(mesh.triangles()).is_empty(), "{several}");
+            let (found, expected) = (mesh.mass_properties(2.0).unwrap(), p.mass_properties(2.0));
+            assert!((found.mass - expected.mass).abs() < 1e-13, "{several}: {found:?}");
+            vertices.truncate(8);
+        }
+    }
 
     #[test]
     fn a_mesh_that_is_not_closed_names_its_open_edges() {

@@ -449,6 +449,8 @@ impl Classes {
             }
             if let Some(at) = found.not_positive {
                 self.refute(m, Class::P, named(at));
+                // A witness that is not accepted proves the contrary no more than it refutes.
+                p = p.and(Err(Why::Rounding));
             }
             let why = if found.cut { Why::Operations } else { Why::Rounding };
             if found.doubtful || found.cut {
@@ -482,6 +484,8 @@ impl Classes {
                 return self.refute(m, Copositive, witness);
             }
             let [negative, zero] = whole.doubtful;
+            // Witnesses that are not accepted prove the contrary no more than they refute.
+            let against = [whole.zero.is_some(), whole.moved.is_some()];
             if !negative {
                 self.prove(Copositive, How::Submatrices);
             }
@@ -492,8 +496,10 @@ impl Classes {
                 self.refute(m, StrictlyCopositive, witness);
             }
             if !negative && !zero {
-                for class in [StrictlyCopositive, CopositivePlus] {
-                    if open(self, class) {
+                for (class, against) in
+                    [StrictlyCopositive, CopositivePlus].into_iter().zip(against)
+                {
+                    if open(self, class) && !against {
                         self.prove(class, How::Submatrices);
                     }
                 }
@@ -549,6 +555,7 @@ impl Classes {
             }
             if let Some(witness) = found.zero {
                 self.refute(m, StrictlyCopositive, named(witness));
+                strictly = strictly.and(Err(Why::Rounding));
             }
         }
         for (class, found) in [(Copositive, copositive), (StrictlyCopositive, strictly)] {

@@ -172,12 +172,23 @@ impl Visit {
     }
 }
 
-/// The sign of the determinant of the matrix with these entries, where rounding does not hide it.
+/// The sign of the determinant of the matrix with these entries, where rounding does not hide it. Units of rows and columns do not matter.
 pub(super) fn determinant_sign(
     n: usize,
     entry: impl Fn(usize, usize) -> Interval,
 ) -> Option<Ordering> {
     let mut a: Vec<_> = (0..n * n).map(|k| entry(k / n, k % n)).collect();
+    // Rows, then columns, by powers of two: the products of n pivots of any size leave the range of doubles.
+    for (along, across) in [(n, 1), (1, n)] {
+        for line in 0..n {
+            let at = |k: usize| line * along + k * across;
+            let size = (0..n).fold(0.0_f64, |size, k| size.max(a[at(k)].middle().abs()));
+            if size > 0.0 && size.is_finite() {
+                let unit = Interval::from((-size.log2().round()).exp2());
+                (0..n).for_each(|k| a[at(k)] = a[at(k)] * unit);
+            }
+        }
+    }
     let mut d = Interval::from(1.0);
     let mut swapped = false;
     for k in 0..n {

@@ -39,6 +39,7 @@
 //! B-subdifferential if that piece is one of the solution map's, and a directional derivative in general in no direction.
 //!
 //! Rows of a polyhedron that x is on and that follow from others count as degenerate: what moves one of them alone changes the piece, a change of F does not, so that with respect to F it is the derivative all the same.
+//! So does a variable with equal bounds whose row vanishes: it follows the one bound or the other.
 //!
 //! Where impulses are not unique the matrix is singular, and there is no derivative of them.
 //! Entries of matrices are data each by itself: a change of a symmetric matrix has both of a pair.

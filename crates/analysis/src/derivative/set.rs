@@ -130,7 +130,7 @@ impl Making<'_> {
         for (j, (&l, &u)) in lower.iter().zip(upper).enumerate() {
             let p = self.held.from[first + j];
             let at_border = (p - l).abs().min((p - u).abs()) <= self.near;
-            self.degenerate += usize::from(l < u && at_border);
+            self.degenerate += usize::from(at_border);
             if p <= l {
                 self.columns[first + j] = Column::Lower(self.bounds + j);
             } else if p >= u {

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use nonsmooth_linalg::{Csc, Matrix, budget};
-use nonsmooth_problem::check::{ContactStatus, Judged, Motion, RowStatus, VerdictOf};
+use nonsmooth_problem::check::{ContactStatus, Judged, Motion, RowCounts, RowStatus, VerdictOf};
 use nonsmooth_problem::field::Field;
 use nonsmooth_problem::{
     Bounds, BoxLcp, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Lcp, LcpPoint,
@@ -190,6 +190,11 @@ fn pairs(statuses: &[RowStatus], bounded: bool) -> (Columns, Vec<Equation>) {
     (columns, pieces)
 }
 
+/// The pairs at the border of two pieces; of equal bounds these are that of the one and that of the other.
+fn at_border(counts: &RowCounts) -> usize {
+    counts.degenerate + counts.fixed
+}
+
 pub(super) fn lcp(
     problem: &Lcp,
     point: &LcpPoint,
@@ -219,7 +224,7 @@ fn in_pairs(
     statement.part("z", Side::X, 0..n);
     statement.part("w", Side::Y, 0..n);
     let (columns, pieces) = pairs(&verdict.statuses, bounded);
-    let (point, degenerate) = (point.z.clone(), verdict.counts.degenerate);
+    let (point, degenerate) = (point.z.clone(), at_border(&verdict.counts));
     Ok(Pieces { statement, matrix, point, columns, pieces, degenerate })
 }
 
@@ -292,7 +297,7 @@ pub(super) fn mcp(
     statement.part("x", Side::X, 0..n);
     statement.part("F", Side::Y, 0..n);
     let (columns, pieces) = pairs(&verdict.statuses, true);
-    let (point, degenerate) = (point.z.clone(), verdict.counts.degenerate);
+    let (point, degenerate) = (point.z.clone(), at_border(&verdict.counts));
     Ok(Pieces { statement, matrix, point, columns, pieces, degenerate })
 }
 
@@ -399,7 +404,7 @@ impl Rows<'_> {
             }
             let margin = tolerance * (self.sizes[j] + (w * lambda).abs());
             let nearest = w * (lambda - l).abs().min((u - lambda).abs());
-            degenerate += usize::from(l < u && c.abs() <= margin && nearest <= margin);
+            degenerate += usize::from(c.abs() <= margin && nearest <= margin);
         }
         degenerate
     }

@@ -24,13 +24,7 @@ impl Journal {
     /// Errors: the file exists and is not empty; what the system refuses.
     pub fn create(path: &Path, campaign: &Campaign) -> Result<Self, String> {
         let mut journal = Self::open(path)?;
-        let length = journal.file.metadata().map_err(|e| refusal(path, &e))?.len();
-        if length > 0 {
-            let path = path.display();
-            return Err(format!(
-                "{path}: expected a new file, found {length} bytes; --resume goes on with it"
-            ));
-        }
+        unused(path).map_err(|e| format!("{e}; --resume goes on with it"))?;
         journal.campaign.clone_from(&campaign.id);
         journal.append(&Line::Campaign(campaign.clone()))?;
         Ok(journal)
@@ -125,6 +119,14 @@ impl Journal {
             let _ = before.and_then(|before| self.file.set_len(before));
             refusal(&self.path, &e)
         })
+    }
+}
+
+/// Refuses a file that is there and not empty: it may be a campaign.
+pub fn unused(path: &Path) -> Result<(), String> {
+    match std::fs::metadata(path).map_or(0, |m| m.len()) {
+        0 => Ok(()),
+        length => Err(format!("{}: expected a new file, found {length} bytes", path.display())),
     }
 }
 

@@ -21,7 +21,7 @@ mod worker;
 pub use child::WorkerCommand;
 pub use files::{Input, describe, inputs};
 pub use job::{Job, Said, Task};
-pub use journal::Journal;
+pub use journal::{Journal, unused};
 pub use pool::{Event, Setup, Summary, run};
 pub use solvers::{Label, Registry, Solvers};
 pub use system::machine;

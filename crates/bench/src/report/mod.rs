@@ -167,10 +167,13 @@ fn conditions(campaign: &Campaign, parts: usize) -> String {
     }
     text.push('.');
     if let Some(plan) = &campaign.plan {
+        let memory = match plan.memory_limit {
+            0 => String::new(),
+            bytes => format!(" and {}", gibibytes(bytes)),
+        };
         text += &format!(
-            " At most {} s and {} a run, {} at a time. ",
+            " At most {} s{memory} a run, {} at a time. ",
             plan.time_limit,
-            gibibytes(plan.memory_limit),
             plural(plan.jobs, "run"),
         );
         text += &match plan.repeats {

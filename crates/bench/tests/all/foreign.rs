@@ -265,6 +265,19 @@ fn lines_are_counted_alike_for_all_ends_of_lines_and_marks_of_encodings() {
 fn a_column_that_stands_twice_is_refused() {
     let e = refused("t.csv", "problem,solver,tol,tolerance,seconds,error\na,s,1e-4,1e-8,1,1e-5\n");
     assert!(e.ends_with("expected one column `tolerance`, found several"), "{e}");
+    // In JSON each row has its own.
+    let row = |iterations: &str| {
+        format!(r#"{{"problem":"a","solver":"S","tol":1e-4,"seconds":1,"error":1,{iterations}}}"#)
+    };
+    let rows = [row(r#""iters":3"#), row(r#""iters":3,"iterations":4"#)];
+    let array = format!("[{}]", rows.join(","));
+    for (name, text, place) in
+        [("t.jsonl", rows.join("\n"), "line 2"), ("t.json", array, "entry 2")]
+    {
+        let read = read(name, &text);
+        let said = format!("{name}, {place}: expected one column `iterations`, found several");
+        assert_eq!((read.mistakes, read.runs.runs.len()), (vec![said], 1));
+    }
 }
 
 #[test]

@@ -11,7 +11,7 @@ use nonsmooth_bench::profile::{
 use nonsmooth_bench::record::{Ending, Run, SIZES};
 use nonsmooth_bench::runs::Runs;
 use nonsmooth_bench::tables::{
-    By, runs_table, summary, summary_page, summary_table, unsolved, unsolved_table,
+    By, competitive, runs_table, summary, summary_page, summary_table, unsolved, unsolved_table,
 };
 use proptest::prelude::*;
 use rand::RngExt;
@@ -102,6 +102,14 @@ fn costs_that_are_zero_or_not_known() {
     let costs = Costs::of(&runs, &Selection::at(KIND, 1e-8), Cost::Factorisations);
     assert_eq!(costs.t, [[1.0], [3.0], [f64::INFINITY]]);
     assert_eq!(costs.unknown, [0, 0, 1]);
+    // What is solved is so without its time.
+    runs.runs[1].seconds = None;
+    let table = competitive(&runs, &Selection::at(KIND, 1e-8)).markdown();
+    assert!(
+        table.ends_with("| A | 1 | 1 | 1 | 1 |\n| B | 1 | 1 | 0 | 0 |\n| C | 1 | 1 | 1 | 1 |\n"),
+        "{table}"
+    );
+    runs.runs[1].seconds = Some(0.0);
     // Times of zero tie.
     let costs = Costs::of(&runs, &Selection::at(KIND, 1e-8), Cost::Seconds);
     assert!(performance(&costs).iter().all(|c| c.steps == [(1.0, 1.0)]));
@@ -191,8 +199,8 @@ fn refusals_leave_the_shares_and_proofs_are_answers() {
     assert_eq!([tightest(0), tightest(1)], [("A", 0.0), ("B", 0.5)]);
     assert_eq!(left_out, [""; 0]);
     assert_eq!(Progress::of(&runs, &selection).data_profile(1e-14)[1].steps, [(10.0, 0.5)]);
-    // Nobody solves r, which those who were asked refuse.
-    assert_eq!(unsolved(&runs, &selection).iter().map(|u| &u.problem).collect::<Vec<_>>(), ["f/r"]);
+    // Nobody solves r, but nobody who was asked takes it.
+    assert_eq!(unsolved(&runs, &selection), []);
 }
 
 #[test]
@@ -485,6 +493,49 @@ fn sizes_are_of_contacts_or_of_pairs() {
             assert!(svg.contains(&title), "{title}");
         }
     }
+}
+
+#[test]
+fn figures_are_xml_and_labels_that_are_cut_differ() {
+    let label = |a: &str, b: &str| format!("{a}{}{b}", "x".repeat(60));
+    let labels =
+        ["a\u{1}\u{fffe}<b>\nc".into(), label("p", "1"), label("p", "2"), label("pp", "2")];
+    let mut runs = campaign("a");
+    runs.runs = labels.iter().map(|label| run("f/p", label, 1.0)).collect();
+    let all = figures(&runs, &Selection::at(KIND, 1e-8)).unwrap();
+    assert_eq!(all.len(), 6);
+    for figure in all {
+        let barred = |c: char| c.is_control() && c != '\n' || c == '\u{fffe}';
+        assert!(!figure.svg.contains(barred), "{}", figure.name);
+        let x = |n| "x".repeat(n);
+        for label in [
+            "a\u{fffd}\u{fffd}&lt;b&gt;".into(),
+            format!("p{}…{}1\n", x(18), x(18)),
+            format!("p{}…{}2\n", x(18), x(18)),
+            format!("pp{}…{}2\n", x(17), x(18)),
+        ] {
+            assert!(figure.svg.contains(&label), "{label} in {}", figure.name);
+        }
+        assert!(!figure.svg.contains("1 problems"), "{}", figure.name);
+    }
+    // Alike at both ends.
+    runs.runs = ["1", "2"]
+        .map(|k| run("f/p", &format!("{}{k}{}", label("", ""), label("", "")), 1.0))
+        .into();
+    let svg = &figures(&runs, &Selection::at(KIND, 1e-8)).unwrap()[0].svg;
+    let cut = format!("{0}…{0}", "x".repeat(19));
+    assert!(svg.contains(&format!("{cut}\n")) && svg.contains(&format!("{cut}-2\n")), "{svg}");
+}
+
+#[test]
+fn figures_are_of_the_tolerances_of_their_kind() {
+    let mut runs = campaign("a");
+    let other = Run { kind: "lcp".into(), tolerance: 1e-12, ..run("l/p", "A", 1.0) };
+    runs.runs = vec![run("f/p", "A", 1.0), other];
+    let all = figures(&runs, &Selection::at(KIND, 1e-8)).unwrap();
+    let svg = |name: &str| &all.iter().find(|f| f.name == name).unwrap().svg;
+    assert!(svg("success").contains("the tightest is 1e-8"));
+    assert!(!svg("data-profile").contains("residual 1e-12"));
 }
 
 #[test]

@@ -222,6 +222,14 @@ fn the_stamp_names_machines_versions_and_limits() {
     assert!(!text.replace(namespace, "").contains("://"));
 }
 
+#[test]
+fn a_campaign_without_a_limit_of_memory_names_none() {
+    let mut free = campaign("here", false);
+    free.plan.as_mut().unwrap().memory_limit = 0;
+    let text = page(&runs(vec![free], vec![run("a", "b", 1e-8, Ending::Solved, 1.0)]));
+    assert!(text.contains("At most 20 s a run, 1 run at a time."));
+}
+
 const NASTY: &str = "</script><script>window.bad = 1</script><img src=x onerror='window.bad = 1'>\u{1}&amp;\"{{data}}";
 
 fn nasty() -> Runs {

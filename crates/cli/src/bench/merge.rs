@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use nonsmooth_bench::campaign;
+
 use super::Joined;
 use crate::report::{count, row};
 use crate::{Exit, files, output};
@@ -16,7 +18,7 @@ pub struct Args {
     /// Files of runs
     #[arg(required = true, value_name = "RUNS.jsonl")]
     files: Vec<PathBuf>,
-    /// The file to write
+    /// The file to write, a new one
     #[arg(long, value_name = "ALL.jsonl")]
     out: PathBuf,
 }
@@ -32,6 +34,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     super::apart(&args.files, &args.out)?;
     files::ends_in("--out", &args.out, &["jsonl"])?;
     files::writable("--out", &args.out)?;
+    campaign::unused(&args.out)?;
     let Joined { runs, twice, mut exit } = super::read(&args.files)?;
     let mut text = format!(
         "{}: {}, {} of {}\n",

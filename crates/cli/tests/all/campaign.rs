@@ -111,12 +111,20 @@ fn parts_are_joined_and_reported() {
             .run(&format!("bench run problems --solver nsgs --out {part}.jsonl --shard {part}/3"))
             .exits(0);
     }
-    let two = folder.run("bench merge 1.jsonl 3.jsonl --out all.jsonl");
+    let two = folder.run("bench merge 1.jsonl 3.jsonl --out two.jsonl");
     assert_eq!(two.code, Some(1));
     assert!(two.stdout.contains("missing parts 2/3"), "{}", two.stdout);
     let all = folder.run("bench merge 1.jsonl 2.jsonl 3.jsonl --out all.jsonl").exits(0);
     assert!(all.stdout.contains("3 campaigns, 10 runs of 5 problems"), "{}", all.stdout);
     assert_eq!(runs(&folder.path("all.jsonl")).len(), 10);
+    // Neither is a campaign that is there lost.
+    let before = std::fs::read(folder.path("2.jsonl")).unwrap();
+    folder
+        .run("bench merge 1.jsonl 3.jsonl --out 2.jsonl")
+        .refused(&["2.jsonl: expected a new file, found"]);
+    assert!(std::fs::read(folder.path("2.jsonl")).unwrap() == before);
+    std::fs::write(folder.path("empty.jsonl"), "").unwrap();
+    folder.run("bench merge 1.jsonl 2.jsonl 3.jsonl --out empty.jsonl").exits(0);
     let own = folder.run("bench merge 1.jsonl --out 1.jsonl");
     assert_eq!(own.code, Some(2));
     assert!(own.stderr.contains("expected a file of its own"), "{}", own.stderr);

@@ -41,8 +41,11 @@ fn what_goes_to_files_needs_no_reader() {
 fn a_full_disk_is_reported() {
     let folder = Folder::new();
     let full = File::options().write(true).open("/dev/full").unwrap();
-    let output = folder.command().arg("list").stdout(full).output().unwrap();
-    Run::from(output).refused(&["standard output"]);
+    for word in ["list", "--help", "--version"] {
+        let full = full.try_clone().unwrap();
+        let output = folder.command().arg(word).stdout(full).output().unwrap();
+        Run::from(output).refused(&["standard output"]);
+    }
 }
 
 #[test]
@@ -78,13 +81,13 @@ fn ctrl_c_returns_the_best_iterate() {
 /// The limit holds while a file is read, also one that nobody ends.
 #[test]
 fn a_pipe_that_nobody_writes_to_does_not_outlast_the_limit() {
-    let folder = Folder::new();
+    let folder = Folder::with_problems();
     let made = Command::new("mkfifo").arg(folder.path("pipe.toml")).status().unwrap();
     assert!(made.success());
-    for file in ["-", "pipe.toml"] {
-        let arguments = ["solve", file, "--time-limit", "0.2", "--json"];
+    for file in ["-", "pipe.toml", "wall.hdf5 --warm-start=pipe.toml"] {
         let mut command = folder.command();
-        command.args(arguments).stdin(Stdio::piped());
+        command.args(["solve", "--time-limit", "0.2", "--json"]).args(file.split(' '));
+        command.stdin(Stdio::piped());
         let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         // It stays open until the end.
         let input = child.stdin.take();

@@ -495,6 +495,25 @@ fn inequalities_over_products() {
     });
 }
 
+/// Where the row of a variable with equal bounds vanishes it follows the one bound or the other.
+#[test]
+fn equal_bounds_without_a_force_are_a_border() {
+    let two = || vec![1.0; 2];
+    let identity = Dense::from_rows(&[[1.0, 0.0], [0.0, 1.0]]).unwrap();
+    let row = |i: usize| format!("x{} - {:?}", i + 1, [1.0, 5.0][i]);
+    let field = || Expressions::parse(&[row(0), row(1)], &[]).unwrap();
+    let set = Set::Box { lower: two(), upper: two() };
+    let problems: [AnyProblem; 3] = [
+        BoxLcp::new(identity, vec![-1.0, -5.0], two(), two()).unwrap().into(),
+        Mcp::new(field(), two(), two(), two()).unwrap().into(),
+        Vi::new(field(), set, two()).unwrap().into(),
+    ];
+    for problem in problems {
+        let by = Derivative::of(&problem, &LcpPoint { z: two() }.into(), 1e-8).unwrap();
+        assert_eq!(by.degenerate, 1, "{}", problem.kind().name());
+    }
+}
+
 /// By hand, and where pieces meet.
 #[test]
 fn sets_at_their_borders() {
@@ -806,17 +825,19 @@ fn what_has_no_derivative_says_so() {
     let over = Mlcp::rectangular(m, vec![-1.0, -2.0], 2, 1).unwrap();
     let at = LcpPoint { z: vec![1.0] };
     assert_eq!(Derivative::of_mlcp(&over, &at, 1e-8).unwrap_err(), DerivativeError::Singular);
-    // A row between two bounds that are met with no velocity: it is at a border.
-    let rows = RowsLocal {
-        V: Csc::zeros(2, 1),
-        R: Csc::diagonal(&[1.0]),
-        s: vec![0.0],
-        bounds: Bounds { lower: vec![0.0], upper: vec![1.0] },
-    };
-    let w = Bsr::<2>::from_csc(&Csc::diagonal(&[1.0, 1.0]));
-    let local = FrictionLocal::with_rows(w, vec![-1.0, 0.1], vec![0.5], rows).unwrap();
-    let at = LocalPoint { r: vec![1.0, -0.1], lambda: vec![0.0] };
-    assert_eq!(Derivative::of_local(&local, &at, 1e-8).unwrap().degenerate, 1);
+    // A row between two bounds, perhaps equal, that are met with no velocity: it is at a border.
+    for upper in [1.0, 0.0] {
+        let rows = RowsLocal {
+            V: Csc::zeros(2, 1),
+            R: Csc::diagonal(&[1.0]),
+            s: vec![0.0],
+            bounds: Bounds { lower: vec![0.0], upper: vec![upper] },
+        };
+        let w = Bsr::<2>::from_csc(&Csc::diagonal(&[1.0, 1.0]));
+        let local = FrictionLocal::with_rows(w, vec![-1.0, 0.1], vec![0.5], rows).unwrap();
+        let at = LocalPoint { r: vec![1.0, -0.1], lambda: vec![0.0] };
+        assert_eq!(Derivative::of_local(&local, &at, 1e-8).unwrap().degenerate, 1);
+    }
 }
 
 /// Units of bodies and contacts that are far apart are no singularity.

@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 globals().update(_CLASSES)
 
+# Where it is found again by who reads a pickled one.
+Error.__module__ = __name__
+
 __all__ = [
     "Answer",
     "Ball",

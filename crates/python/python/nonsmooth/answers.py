@@ -52,6 +52,9 @@ class Unsolved(RuntimeError):
         super().__init__(f"{answer.message}; relative residual {answer.residual:.3g}")
         self.answer = answer
 
+    def __reduce__(self) -> Any:
+        return Unsolved, (self.answer,)
+
 
 class Table(np.ndarray[Any, np.dtype[np.void]]):
     """A structured array: a row for each contact or variable, columns by name."""
@@ -79,10 +82,10 @@ class Table(np.ndarray[Any, np.dtype[np.void]]):
 
 def _tabled(columns: Mapping[str, Any]) -> Table:
     arrays = {name: np.asarray(column) for name, column in columns.items()}
-    # Contacts and variables are counted, unless they have names.
+    # Contacts and variables are counted; names are words, of digits too.
     for name, column in columns.items():
-        if isinstance(column, list) and column and all(word.isdigit() for word in column):
-            arrays[name] = np.array([int(word) for word in column])
+        if name != "name" and isinstance(column, list) and column == [str(k) for k in range(len(column))]:
+            arrays[name] = np.arange(len(column))
     size = max((a.size for a in arrays.values()), default=0)
     kinds = [(name, a.dtype if a.size else np.dtype(float)) for name, a in arrays.items()]
     made = np.empty(size, dtype=kinds)
@@ -286,7 +289,8 @@ def solve(
 
     The GIL is released. Ctrl-C raises KeyboardInterrupt, with the best point so far as its attribute ``answer``. Functions of the problem run in the present
     context (``contextvars``, ``numpy.errstate``), of large problems on another thread. What they raise ends the solve and is raised here, but where F is
-    only asked whether it is defined (a step that may leave its domain): there it is the answer that it is not. Raises :class:`Error` for what is a mistake; that there is no solution, or that none was found, is a status.
+    only asked whether it is defined (a step that may leave its domain): there it is the answer that it is not, of which an unsolved answer has the first in its
+    ``account``. What F gives in another shape, MemoryError, RecursionError and NameError are raised there too. Raises :class:`Error` for what is a mistake; that there is no solution, or that none was found, is a status.
     """
     name, own = arguments.named(solver)
     every = {**own, **registered(settings)} if settings else own

@@ -61,13 +61,19 @@ class Runs:
         """A row a run; the residuals have columns of their own."""
         import pandas
 
-        flat = [{**row, **row.pop("residuals", {})} for row in self.rows]
+        flat = []
+        for row in self.rows:
+            residuals = row.pop("residuals", None) or {}
+            flat.append({**row, **residuals})
         return pandas.DataFrame(flat)
 
     def profile(
         self, cost: str = "seconds", *, kind: Optional[str] = None, tol: Optional[float] = None
     ) -> Profile:
-        """Performance profiles by seconds, iterations or factorisations, on the problems of a kind at a tolerance: those of most runs where nothing is said."""
+        """Performance profiles by seconds, iterations or factorisations, on the problems of a kind at a tolerance: those of most runs where nothing is said.
+
+        A solver that solves and does not report the cost is left out: it would seem to fail.
+        """
         kinds = dict(self._native.kinds())
         if kind is None and kinds:
             kind = max(kinds, key=lambda one: kinds[one])
@@ -77,7 +83,7 @@ class Runs:
             tol = self._native.tolerance()
         if tol is None:
             raise _nonsmooth.Error("tol: expected a tolerance at which there are runs, found none")
-        return Profile(dict(self._native.profile(kind, tol, cost)), cost)
+        return Profile(dict(self._native.profile(kind, arguments.real("tol", tol), cost)), cost)
 
     def save(self, path: Path) -> None:
         """Writes the runs as ``nonsmooth bench`` reads them (.jsonl)."""
@@ -113,13 +119,16 @@ def _each(problems: Problems) -> Iterable[tuple[str, Problem]]:
 
 def _label(solver: Union[str, Settings]) -> str:
     name, settings = arguments.named(solver)
-    said = ",".join(f"{key}={value}" for key, value in settings.items())
+    # As the command line has them: true, not True.
+    said = ",".join(
+        f"{key}={value if isinstance(value, str) else json.dumps(value)}" for key, value in settings.items()
+    )
     return f"{name}:{said}" if said else name
 
 
 def bench(
     problems: Problems,
-    solvers: Union[str, Settings, Sequence[Union[str, Settings]]] = ("auto",),
+    solvers: Union[str, Settings, Iterable[Union[str, Settings]]] = ("auto",),
     *,
     tol: Union[float, Sequence[float]] = 1e-8,
     time_limit: float = 60.0,
@@ -132,6 +141,7 @@ def bench(
     """
     if isinstance(solvers, (str, Settings)):
         solvers = (solvers,)
+    solvers = tuple(solvers)
     for solver in solvers:
         name, settings = arguments.named(solver)
         _nonsmooth.check(name, dict(settings))
@@ -175,7 +185,7 @@ def bench(
         about = {
             "family": "",
             "kind": problem.kind,
-            "contacts": problem._native.contacts or problem.unknowns,
+            "contacts": problem._native.pairs,
         }
         lines.append({"line": "problem", "name": name, "unknowns": problem.unknowns, **about})
         for solver in solvers:

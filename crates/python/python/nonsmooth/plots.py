@@ -27,7 +27,8 @@ def _pyplot() -> Any:
 
 
 def _axes(ax: Optional[Axes]) -> Axes:
-    made: Axes = ax if ax is not None else _pyplot().subplots()[1]
+    # With room for a legend beside the axes.
+    made: Axes = ax if ax is not None else _pyplot().subplots(layout="constrained")[1]
     return made
 
 
@@ -57,9 +58,14 @@ def _tangential(table: Any, letter: str) -> Any:
     return np.sqrt(sum(np.asarray(table[name]) ** 2 for name in names))
 
 
+FEW = 8
+"""As many curves are named within the axes, more beside them."""
+COLUMN = 36
+"""As many names stand below each other."""
 COLOURS = {
     "open": "tab:gray",
     "stick": "tab:blue",
+    "stick at limit": "tab:cyan",
     "slip": "tab:red",
     "roll": "tab:green",
     "slip and roll": "tab:orange",
@@ -74,8 +80,11 @@ def cone(answer: Answer, ax: Optional[Axes] = None) -> Axes:
     n, t = np.asarray(table["r_n"]), _tangential(table, "r")
     mu = np.asarray(table["mu"])
     size = np.divide(t, mu, out=np.zeros_like(t), where=mu > 0)
-    for status, colour in COLOURS.items():
-        of = np.asarray(table["status"]) == status
+    statuses = np.asarray(table["status"])
+    # What has no colour of its own is drawn all the same.
+    others = {str(status): "black" for status in np.unique(statuses) if status not in COLOURS}
+    for status, colour in {**COLOURS, **others}.items():
+        of = statuses == status
         if of.any():
             axes.plot(n[of], size[of], ".", color=colour, label=f"{status} ({of.sum()})")
     most = float(n.max(initial=0.0))
@@ -129,12 +138,29 @@ def profiles(profile: Profile, ax: Optional[Axes] = None) -> Axes:
     """Performance profiles: the share of problems by how many times the cost of the best a solver took."""
     axes = _axes(ax)
     most = max((steps[-1][0] for steps in profile.curves.values() if steps), default=1.0)
-    for solver, steps in profile.curves.items():
-        x, y = zip(*steps) if steps else ((1.0,), (0.0,))
-        axes.step([*x, 1.1 * most], [*y, y[-1]], where="post", label=solver)
+    for k, (solver, steps) in enumerate(profile.curves.items()):
+        x, y = zip(*[(1.0, 0.0), *steps])
+        # Colours come again after ten.
+        style = ("-", "--", ":", "-.")[k // 10 % 4]
+        axes.step([*x, 1.1 * most], [*y, y[-1]], style, where="post", label=solver)
     axes.set_xscale("log")
     axes.set_ylim(0, 1.02)
     axes.set_xlabel(f"{profile.cost} over those of the best")
     axes.set_ylabel("share of problems solved")
-    axes.legend()
+    many = len(profile.curves)
+    if many > FEW:
+        # They would hide the curves.
+        columns = -(-many // COLUMN)
+        axes.legend(
+            loc="upper left",
+            bbox_to_anchor=(1.02, 1.0),
+            borderaxespad=0.0,
+            fontsize="xx-small",
+            ncols=columns,
+        )
+        if ax is None:
+            figure: Any = axes.get_figure()
+            figure.set_figwidth(figure.get_figwidth() + 2.5 * columns)
+    else:
+        axes.legend()
     return axes

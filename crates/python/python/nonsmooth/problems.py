@@ -69,8 +69,17 @@ class Problem:
         """Puts other parts in the place of those that are there: ``problem.update(q=q)``.
 
         What a solver has found out of the pattern of the matrices is kept for the next solve with it.
-        Cost: a copy of the problem. Raises :class:`Error` where the parts do not fit; then nothing is changed.
+        Parts have the names that the constructor has, and bounds may be one number for all. Cost: a copy of the problem. Raises :class:`Error` where the
+        parts do not fit; then nothing is changed.
         """
+        if "x0" in parts and "start" not in parts and self.kind in ("mcp", "vi"):
+            parts["start"] = parts.pop("x0")
+        bounds = {"lower", "upper"} & parts.keys()
+        if bounds and "friction" not in self.kind:
+            others = [parts[name] for name in ("q", "F", "start") if name in parts]
+            sizes = (len(p) for p in others if isinstance(p, (list, tuple)) or getattr(p, "ndim", 0) == 1)
+            n = next(sizes, self.unknowns)
+            parts.update({name: _all(parts[name], n) for name in bounds})
         self._native.update(parts)
 
     def save(self, path: Path, answer: object = None) -> None:
@@ -225,6 +234,9 @@ class Friction(Problem):
         parts = dict(
             mu=mu, mu_r=mu_r, W=W, q=q, V=V, R=R, s=s, M=M, H=H, f=f, w=w, G=G, b=b, lower=lower, upper=upper
         )
+        known = (2, 3) if mu_r is None else (2, 3, 5)
+        if dimension is not None and (np.ndim(dimension) != 0 or np.asarray(dimension).item() not in known):
+            raise _nonsmooth.Error(f"dimension: expected one of {', '.join(map(str, known))}, found {dimension!r}")
         self._native = _nonsmooth.Problem.friction(parts, dimension)
 
     @property
@@ -377,7 +389,8 @@ class VI(Problem):
 
 def _all(bound: Optional[Numbers], n: Optional[int]) -> Optional[Numbers]:
     """One bound for all n variables, where it is one."""
-    if n is not None and bound is not None and np.ndim(bound) == 0:
+    # Of one that is masked it is said where it is read.
+    if n is not None and bound is not None and np.ndim(bound) == 0 and not np.ma.isMaskedArray(bound):
         return np.full(n, bound)
     return bound
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import inspect
 import keyword
 import textwrap
-from typing import Any, ClassVar, Mapping, Union
+from typing import Any, ClassVar, Mapping, Optional, Union
 
 import numpy as np
 
@@ -21,13 +21,23 @@ def argument(key: str) -> str:
     return f"{key}_" if keyword.iskeyword(key) else key
 
 
+def registered_key(name: str) -> str:
+    """The key of a setting of which this is the keyword."""
+    return name[:-1] if keyword.iskeyword(name[:-1]) and name.endswith("_") else name
+
+
 def registered(settings: Mapping[str, object]) -> dict[str, object]:
-    """Settings by the registry's keys, numbers of numpy as those of Python."""
-    keys = {argument(key): key for key in keyword.kwlist}
+    """Settings by the registry's keys, numbers of numpy as those of Python; one that is None is as if it were not given, if there is such a one."""
+    keys = {registered_key(name): value for name, value in settings.items()}
     return {
-        keys.get(name, name): value.item() if isinstance(value, np.generic) else value
-        for name, value in settings.items()
+        key: value.item() if isinstance(value, np.generic) else value
+        for key, value in keys.items()
+        if value is not None or not any(key in made.known for made in CLASSES.values())
     }
+
+
+UNSAID = object()
+"""In place of an argument that is not given."""
 
 
 class Settings:
@@ -38,7 +48,7 @@ class Settings:
     kinds: ClassVar[tuple[str, ...]] = ()
     """The kinds of problem that it solves."""
     known: ClassVar[Mapping[str, _nonsmooth.Setting]] = {}
-    """Its settings by their keys."""
+    """Its settings by their keys; a default of None is one that each kind of problem has of its own."""
 
     name: str
     settings: dict[str, object]
@@ -49,15 +59,15 @@ class Settings:
         _nonsmooth.check(self.name, self.settings)
 
     def __getattr__(self, name: str) -> Any:
-        key = next(iter(registered({name: None})))
+        key = registered_key(name)
         if key in type(self).known:
             return self.settings.get(key, type(self).known[key]["default"])
         raise AttributeError(f"{type(self).__name__} has no setting {name}")
 
     def __setattr__(self, name: str, value: object) -> None:
-        key = next(iter(registered({name: None})))
+        key = registered_key(name)
         if key in type(self).known:
-            changed = {**self.settings, **registered({key: value})}
+            changed = registered({**self.settings, key: value})
             _nonsmooth.check(self.name, changed)
             self.settings = changed
         elif name in ("name", "settings"):
@@ -82,7 +92,14 @@ class Settings:
 class Prefixed(Settings):
     """A solver behind a reformulation, with the settings of both."""
 
-    def __init__(self, solver: Union[str, Settings] = "auto", **settings: object) -> None:
+    usual: ClassVar[Optional[str]] = None
+    """The solver where none is said; None: one has to be."""
+
+    def __init__(self, solver: object = UNSAID, **settings: object) -> None:
+        if solver is UNSAID:
+            if self.usual is None:
+                raise TypeError(f"{type(self).__name__}: expected a solver behind the prefix, found none")
+            solver = self.usual
         if not isinstance(solver, (str, Settings)):
             raise _nonsmooth.Error(
                 f"solver: expected a name or an object of settings (nonsmooth.Nsgs()), found {solver!r}"
@@ -125,15 +142,36 @@ class Entry:
         self.needs: list[str] = []
         self.cites: list[str] = []
         self.settings: dict[str, _nonsmooth.Setting] = {}
+        self.defaults: dict[str, dict[str, Any]] = {}
+
+    @property
+    def usual(self) -> Optional[str]:
+        """The solver behind a prefix where none is said."""
+        try:
+            _nonsmooth.check(f"{self.name}/auto", {})
+        except _nonsmooth.Error:
+            return None
+        return "auto"
 
     def add(self, kind: str, about: Union[_nonsmooth.About, _nonsmooth.Prefix]) -> None:
         self.kinds.append(kind)
         self.summaries.setdefault(about["summary"], []).append(kind)
         for setting in about["settings"]:
-            self.settings.setdefault(setting["key"], setting)
+            key, default = setting["key"], setting["default"]
+            first = self.settings.setdefault(key, setting)
+            self.defaults.setdefault(key, {})[kind] = default
+            if first["default"] != default:
+                self.settings[key] = {**first, "default": None}
         needs: list[str] = about.get("needs", [])  # type: ignore[assignment]
         self.needs += [need for need in needs if need not in self.needs]
         self.cites += [key for key in about["cites"] if key not in self.cites]
+
+    def _by_kind(self, key: str) -> str:
+        """The defaults of a setting, each with the kinds that have it."""
+        kinds: dict[str, list[str]] = {}
+        for kind, default in self.defaults[key].items():
+            kinds.setdefault(repr(default), []).append(kind)
+        return "; ".join(f"{default} for {', '.join(of)}" for default, of in kinds.items())
 
     def doc(self) -> str:
         """The docstring: what it is and needs, its settings with defaults and choices."""
@@ -147,8 +185,12 @@ class Entry:
         if self.settings:
             lines += ["", "Settings", "--------"]
         for setting in self.settings.values():
-            lines.append(f"{argument(setting['key'])} : {python_type(setting)}, default {setting['default']!r}")
-            lines += textwrap.wrap(setting["help"], 96, initial_indent="    ", subsequent_indent="    ")
+            default, said = repr(setting["default"]), setting["help"]
+            if setting["default"] is None:
+                default = "by kind"
+                said += f" Default {self._by_kind(setting['key'])}."
+            lines.append(f"{argument(setting['key'])} : {python_type(setting)}, default {default}")
+            lines += textwrap.wrap(said, 96, initial_indent="    ", subsequent_indent="    ")
         lines += ["", *textwrap.wrap(f"References: {', '.join(self.cites)}.", 100)]
         return "\n".join(lines)
 
@@ -178,9 +220,11 @@ def _made(name: str, entry: Entry) -> type[Settings]:
             "solver": entry.name,
             "kinds": tuple(entry.kinds),
             "known": entry.settings,
+            **({"usual": entry.usual} if entry.is_prefix else {}),
         },
     )
-    first = [inspect.Parameter("solver", inspect.Parameter.POSITIONAL_OR_KEYWORD, default="auto")]
+    usual = getattr(made, "usual", None) or inspect.Parameter.empty
+    first = [inspect.Parameter("solver", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=usual)]
     keys = [
         inspect.Parameter(
             argument(key), inspect.Parameter.KEYWORD_ONLY, default=setting["default"]

@@ -1,6 +1,6 @@
 """Settings of the solvers. Written by `python -m nonsmooth.stubs`."""
 
-from typing import Any, ClassVar, Literal, Mapping, Union
+from typing import Any, ClassVar, Literal, Mapping, Optional, Union
 
 from . import _nonsmooth
 
@@ -15,13 +15,16 @@ class Settings:
     def __setattr__(self, key: str, value: object) -> None: ...
 
 class Prefixed(Settings):
-    def __init__(self, solver: Union[str, Settings] = "auto", **settings: object) -> None: ...
+    usual: ClassVar[Optional[str]]
+    def __init__(self, solver: Union[str, Settings] = ..., **settings: object) -> None: ...
 
 class Entry:
     name: str
     is_prefix: bool
     kinds: list[str]
     settings: dict[str, _nonsmooth.Setting]
+    @property
+    def usual(self) -> Optional[str]: ...
     def doc(self) -> str: ...
 
 CLASSES: dict[str, type[Settings]]
@@ -403,7 +406,7 @@ class FacetInner(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         *,
         facets: int = ...,
         facet_angle: float = ...,
@@ -430,7 +433,7 @@ class FacetOuter(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         *,
         facets: int = ...,
         facet_angle: float = ...,
@@ -747,7 +750,7 @@ class Mixed(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         **settings: object,
     ) -> None: ...
 
@@ -958,8 +961,10 @@ class NewtonFb(Settings):
 
     Settings
     --------
-    line_search : Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'], default 'armijo'
-        How the line search accepts a step, on half the square of the function.
+    line_search : Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'], default by kind
+        How the line search accepts a step, on half the square of the function. Default 'armijo' for
+        friction_local_2d, friction_local_3d, friction_global_2d, friction_global_3d; 'nonmonotone'
+        for lcp, mlcp, box_lcp, mcp.
     rho_rule : Literal['fixed', 'norm', 'spectral', 'adaptive'], default 'spectral'
         How rho of each contact follows from its block of W.
     rho : float, default 1.0
@@ -984,7 +989,7 @@ class NewtonFb(Settings):
     def __init__(
         self,
         *,
-        line_search: Literal['none', 'armijo', 'goldstein_price', 'nonmonotone'] = ...,
+        line_search: Optional[Literal['none', 'armijo', 'goldstein_price', 'nonmonotone']] = ...,
         rho_rule: Literal['fixed', 'norm', 'spectral', 'adaptive'] = ...,
         rho: float = ...,
         warm_up: int = ...,
@@ -1514,7 +1519,7 @@ class Presolve(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         **settings: object,
     ) -> None: ...
 
@@ -1591,7 +1596,7 @@ class Proximal(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         *,
         prox_rule: Literal['fixed', 'residual', 'success'] = ...,
         prox_alpha: float = ...,
@@ -1707,7 +1712,7 @@ class Reduce(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         **settings: object,
     ) -> None: ...
 
@@ -1870,7 +1875,7 @@ class Split(Prefixed):
 
     def __init__(
         self,
-        solver: Union[str, Settings] = "auto",
+        solver: Union[str, Settings],
         **settings: object,
     ) -> None: ...
 

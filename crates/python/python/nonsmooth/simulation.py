@@ -92,10 +92,20 @@ class World:
         made: list[Any] = self.document.setdefault(name, [])
         return made
 
+    def _named(self, name: str, kind: str, *lists: str) -> str:
+        """The name that is given, else the first that is free from the number of those in the first list on."""
+        if name:
+            return name
+        taken = {entry.get("name") for others in lists for entry in self.document.get(others, [])}
+        k = len(self.document.get(lists[0], []))
+        while f"{kind}{k}" in taken:
+            k += 1
+        return f"{kind}{k}"
+
     def body(self, shape: Optional[Mapping[str, object]] = None, *, name: str = "", **table: object) -> str:
         """Adds a body with a shape (``{"kind": "sphere", "radius": 0.1}``), or ``shapes``; its name, made where none is given."""
         bodies = self._list("bodies")
-        name = name or f"body{len(bodies)}"
+        name = self._named(name, "body", "bodies", "elastic")
         entry = {"name": name, **_own(table)}
         if shape is not None:
             entry["shape"] = _own(shape)
@@ -161,7 +171,7 @@ class World:
     ) -> str:
         """An elastic box by its half sides (m), its elements along each axis and Young's modulus (Pa); further ``poisson``, ``density`` or ``material``, ``damping``, ``held``, ..."""
         solids = self._list("elastic")
-        name = name or f"elastic{len(solids)}"
+        name = self._named(name, "elastic", "elastic", "bodies")
         entry = {"name": name, "half": list(half), "divisions": list(divisions), "young": young}
         solids.append({**entry, **_own(table)})
         return name
@@ -195,7 +205,7 @@ class World:
         (in the frame of the world), ``limits`` (a pair, or a table), ``spring``, ``friction``, ``motor``, ``motion``, ...
         """
         joints = self._list("joints")
-        name = name or f"joint{len(joints)}"
+        name = self._named(name, "joint", "joints")
         entry = _own(table)
         limits = entry.get("limits")
         if isinstance(limits, (tuple, list, np.ndarray)):
@@ -529,7 +539,8 @@ class Run:
     def __repr__(self) -> str:
         word = "solved" if self.solved else "stopped" if self.stopped else "not solved"
         steps = len(self.steps["time"])
-        end = self.steps["time"][-1] if steps else self.simulation.t
+        # The simulation may have gone on since.
+        end = self.steps["time"][-1] if steps else self.t[-1]
         deep = f", but bodies overlap deeply in {self.deep} of them" if self.deep else ""
         return f"<Run: {len(self.bodies)} bodies, {steps} steps to t = {end:.6g} s, {word}{deep}>"
 

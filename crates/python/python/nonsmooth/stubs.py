@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from .settings import Entry, argument, entries, python_type
+
+if TYPE_CHECKING:
+    from ._nonsmooth import Setting
 
 HEAD = '''"""Settings of the solvers. Written by `python -m nonsmooth.stubs`."""
 
-from typing import Any, ClassVar, Literal, Mapping, Union
+from typing import Any, ClassVar, Literal, Mapping, Optional, Union
 
 from . import _nonsmooth
 
@@ -21,13 +26,16 @@ class Settings:
     def __setattr__(self, key: str, value: object) -> None: ...
 
 class Prefixed(Settings):
-    def __init__(self, solver: Union[str, Settings] = "auto", **settings: object) -> None: ...
+    usual: ClassVar[Optional[str]]
+    def __init__(self, solver: Union[str, Settings] = ..., **settings: object) -> None: ...
 
 class Entry:
     name: str
     is_prefix: bool
     kinds: list[str]
     settings: dict[str, _nonsmooth.Setting]
+    @property
+    def usual(self) -> Optional[str]: ...
     def doc(self) -> str: ...
 
 CLASSES: dict[str, type[Settings]]
@@ -41,13 +49,20 @@ def solvers(problem: object = None) -> list[str]: ...
 '''
 
 
+def _optional(setting: Setting) -> str:
+    """The type of an argument; None stands for a default that depends on the kind of problem."""
+    kind = python_type(setting)
+    return f"Optional[{kind}]" if setting["default"] is None else kind
+
+
 def _class(name: str, entry: Entry) -> str:
     # What is nowhere said may be anything of its type.
     arguments = [
-        f"        {argument(key)}: {python_type(setting)} = ...,"
+        f"        {argument(key)}: {_optional(setting)} = ...,"
         for key, setting in entry.settings.items()
     ]
-    first = ["        solver: Union[str, Settings] = \"auto\","] if entry.is_prefix else []
+    usual = f' = "{entry.usual}"' if entry.usual else ""
+    first = [f"        solver: Union[str, Settings]{usual},"] if entry.is_prefix else []
     # A prefix passes on the settings of the solver behind it.
     rest = ["        **settings: object,"] if entry.is_prefix else []
     star = ["        *,"] if arguments else []

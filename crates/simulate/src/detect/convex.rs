@@ -2,7 +2,8 @@
 //!
 //! `sep(n) = min_{q ∈ B} n · q − max_{p ∈ A} n · p` is largest for the normal of the contact. Apart it is the distance, which [`gjk`](super::gjk) finds. Where the solids
 //! overlap by d, B is moved off by `s > d` along the best normal known and the distance gives the next one: the fixed points are the local maxima of sep, found in one
-//! step where surfaces are flat, and linearly with rate `s/(s + R − d)` where they have the radius R. It starts from the best of all flat faces.
+//! step where surfaces are flat, and linearly with rate `s/(s + R − d)` where they have the radius R, which is extrapolated. It starts from the best of all flat faces, mantles and, where the
+//! solids are apart by hardly more than rounding, the direction of the distance, which then is the answer mostly.
 //!
 //! Then the features say where: what lies on a flat face or end is clipped by it, whole; lines of mantles and edges meet at one point or, where they are parallel, at two; these have
 //! closed forms. What is left (a rim at an edge, a cone at an edge or at another cone) is a pair of points with a normal, to first order in how far the bodies move in a step.
@@ -18,12 +19,18 @@ use crate::detect::turned::{LEVEL, STANDING, Turned};
 use crate::detect::witness::{Anchor, Feature, Witness};
 use crate::rotation::Pose;
 
-/// Nearer than this share of the size, the normal is found with the bodies moved apart.
+/// Nearer than this share of the size, the normal that the distance gives has the bodies' rounding in it, and is one of those to begin with.
 const NEAR: f64 = 1e-4;
-/// By which share of the size they are moved apart then.
-const APART: f64 = 0.25;
+/// A normal that separates by no less than the distance less this share of it is that of the distance.
+const SEPARATES: f64 = 1e-6;
+/// By which share of the size the bodies are moved apart where they overlap.
+const APART: f64 = 0.02;
 /// Solids that overlap by more than this share of the size may do so in several directions.
 const DEEP: f64 = 1e-3;
+/// Steps of a climb at most.
+const CLIMBS: usize = 30;
+/// A climb whose steps shrink by a larger factor is extrapolated.
+const SLOW: f64 = 0.3;
 /// Normals that differ by less have converged.
 const CONVERGED: f64 = 1e-13;
 /// A flat face that separates worse by less than this share of the size gives the normal.
@@ -32,6 +39,8 @@ const FLAT: f64 = 1e-8;
 const ALIGNED: f64 = 1e-6;
 /// A line that is inclined by less than this is met as a whole.
 const PARALLEL: f64 = 1e-3;
+/// Points this share of its radius outside a rim are on it.
+const SAME_RIM: f64 = 1e-9;
 /// An end that is inclined by more stands on its lowest point alone.
 const STANDS: f64 = 0.05;
 
@@ -56,8 +65,16 @@ pub(crate) struct Flat<'a> {
 
 pub(crate) enum Extent<'a> {
     All,
-    Polygon { corners: &'a [u32], edges: &'a [u32], vertices: &'a [Vec3] },
-    Disc { centre: Vec3, radius: f64 },
+    Polygon {
+        corners: &'a [u32],
+        edges: &'a [u32],
+        vertices: &'a [Vec3],
+    },
+    /// An end of a solid of revolution.
+    Disc {
+        solid: Turned,
+        end: usize,
+    },
 }
 
 /// What of a solid meets where no face does: a rounded line, or a point of a surface.
@@ -68,10 +85,10 @@ enum Core {
 
 /// The normal of a contact from the first to the second solid, and where they are nearest.
 #[derive(Clone, Copy)]
-struct Meeting {
-    normal: Vec3,
-    separation: f64,
-    on: [Vec3; 2],
+pub(super) struct Meeting {
+    pub normal: Vec3,
+    pub separation: f64,
+    pub on: [Vec3; 2],
 }
 
 /// All points where a and b are nearer to each other than `prediction`; whether they are, wherever.
@@ -165,8 +182,7 @@ pub(crate) fn on_flat(
                 for i in 0..STANDING {
                     let x = world.standing(k, i);
                     if flat.holds(x) {
-                        let own = Feature::Curved((8 + k * STANDING + i) as u32);
-                        point(flat.feature, own, x, 0.0, Anchor::Other);
+                        point(flat.feature, standing(k, i), x, 0.0, Anchor::Other);
                     }
                 }
                 // Corners of the face below the end, and where its edges and the rim cross.
@@ -181,7 +197,7 @@ pub(crate) fn on_flat(
                     local: local.outwards(k),
                     point: centre,
                     pose,
-                    extent: Extent::Disc { centre, radius },
+                    extent: Extent::Disc { solid: *world, end: k },
                 };
                 flat.outline(|corner, edge, p, q| {
                     let Some(ends) = below.clip(onto(p), onto(q)) else { return };
@@ -193,13 +209,22 @@ pub(crate) fn on_flat(
                         point(edge, cut, onto(add(p, scale(t, d))), 0.0, Anchor::Both);
                     }
                 });
-                if let Extent::Disc { centre: other, radius: r } = flat.extent {
-                    crossings(flat, (other, r), (onto(centre), radius)).into_iter().for_each(
-                        |(end, x)| {
-                            let own = Feature::Curved(6 + end);
-                            point(flat.feature, own, onto(x), 0.0, Anchor::Both);
-                        },
-                    );
+                if let Extent::Disc { solid: other, end } = &flat.extent {
+                    // What the other end stands on has the name that it has with the ends the other way round. A point of both rims is taken from above.
+                    let inside = radius * (1.0 - SAME_RIM);
+                    for i in 0..STANDING {
+                        let x = onto(other.standing(*end, i));
+                        if norm(sub(x, centre)) < inside {
+                            let face = Feature::Face(k as u32);
+                            point(standing(*end, i), face, x, 0.0, Anchor::Face);
+                        }
+                    }
+                    let rim = (other.end(*end), other.radii[*end]);
+                    let both = crossings(flat.normal, rim, (onto(centre), radius));
+                    for (end, x) in both.into_iter().flatten().enumerate() {
+                        let own = Feature::Curved(6 + end as u32);
+                        point(flat.feature, own, onto(x), 0.0, Anchor::Both);
+                    }
                 }
             }
             let (out, sine) = world.across(down);
@@ -245,19 +270,23 @@ fn apart(ends: [(f64, Feature); 2]) -> impl Iterator<Item = (u32, f64, Feature)>
     ends.into_iter().enumerate().take(count).map(|(k, (t, cut))| (k as u32, t, cut))
 }
 
-/// Where the boundaries of two discs in one plane cross.
-fn crossings(flat: &Flat, (p, r): (Vec3, f64), (q, s): (Vec3, f64)) -> Vec<(u32, Vec3)> {
+/// The name of point i of those on which end k of a solid of revolution stands.
+fn standing(k: usize, i: usize) -> Feature {
+    Feature::Curved((8 + k * STANDING + i) as u32)
+}
+
+/// Where the boundaries of two discs in a plane with normal n cross.
+fn crossings(n: Vec3, (p, r): (Vec3, f64), (q, s): (Vec3, f64)) -> Option<[Vec3; 2]> {
     let d = sub(q, p);
-    let d = sub(d, scale(dot(d, flat.normal), flat.normal));
+    let d = sub(d, scale(dot(d, n), n));
     let far = norm(d);
     if far <= (r - s).abs() || far >= r + s {
-        return vec![];
+        return None;
     }
     let along = 0.5 * (far + (r - s) * (r + s) / far);
     let off = (r * r - along * along).max(0.0).sqrt();
-    let (u, v) = (scale(1.0 / far, d), scale(1.0 / far, cross(flat.normal, d)));
-    let at = |sign: f64| add(p, add(scale(along, u), scale(sign * off, v)));
-    vec![(0, at(-1.0)), (1, at(1.0))]
+    let (u, v) = (scale(1.0 / far, d), scale(1.0 / far, cross(n, d)));
+    Some([-1.0, 1.0].map(|sign| add(p, add(scale(along, u), scale(sign * off, v)))))
 }
 
 /// Where lines and points meet.
@@ -336,8 +365,9 @@ fn meeting(a: &Side, b: &Side, reach: f64) -> Option<Meeting> {
     let across =
         a.mantle(b.middle()).into_iter().chain(b.mantle(a.middle()).map(|n| scale(-1.0, n)));
     let known = std::iter::once(scale(1.0 / norm(start), start)).chain(across);
-    for n in known.chain(flats(a, b)) {
-        let now = measured(a, b, n);
+    let known = known.chain(flats(a, b)).map(|n| measured(|d| a.support(d), b, n));
+    let apart = near.map(|c| measured(|d| a.support(d), b, c.normal));
+    for now in known.chain(apart) {
         let better = |s: &Option<Meeting>| s.is_none_or(|s| now.separation > s.separation);
         if let Some(k) = starts.iter().position(better) {
             starts[k..].rotate_right(1);
@@ -348,36 +378,54 @@ fn meeting(a: &Side, b: &Side, reach: f64) -> Option<Meeting> {
     if first.separation > reach {
         return None;
     }
+    // No direction separates by more than the distance.
+    if let Some(c) = near.filter(|c| first.separation >= (1.0 - SEPARATES) * c.distance) {
+        return Some(snapped(a, b, Meeting { on: c.on, ..first }, size));
+    }
     // Deep inside there are several local maxima.
     let count = if first.separation > -DEEP * size { 1 } else { 3 };
-    let all = starts.into_iter().flatten().take(count).map(|from| climbed(a, b, from, size));
+    let all = starts.into_iter().flatten().take(count);
+    let all = all.map(|from| climbed(|d| a.support(d), b, from, size));
     let best = all.max_by(|s, t| s.separation.total_cmp(&t.separation))?;
     Some(snapped(a, b, best, size))
 }
 
-/// The local maximum of the separation that is reached from a direction.
-fn climbed(a: &Side, b: &Side, mut best: Meeting, size: f64) -> Meeting {
-    for _ in 0..30 {
+/// The local maximum of the separation of b from a set with these support points that is reached from a direction.
+pub(super) fn climbed(a: impl Fn(Vec3) -> Vec3, b: &Side, mut best: Meeting, size: f64) -> Meeting {
+    let mut last = None;
+    for _ in 0..CLIMBS {
         let s = APART * size - best.separation;
         let off = scale(s, best.normal);
         let moved = |d: Vec3| add(b.support(d), off);
-        let Some(c) = closest(|d| a.support(d), moved, best.normal, size) else { break };
-        let now = measured(a, b, c.normal);
+        let Some(c) = closest(&a, moved, best.normal, size) else { break };
+        let now = measured(&a, b, c.normal);
+        // The separation grows with each step: where it does not, it is by rounding, and these are the points of the best normal.
+        best.on = [c.on[0], sub(c.on[1], off)];
         if now.separation < best.separation {
             break;
         }
-        let turned = norm(sub(now.normal, best.normal));
-        best = Meeting { on: [c.on[0], sub(c.on[1], off)], ..now };
-        if turned < CONVERGED {
+        let step = sub(now.normal, best.normal);
+        best = Meeting { on: best.on, ..now };
+        if norm(step) < CONVERGED {
             break;
+        }
+        // Steps of which each is the last one times q end q/(1 − q) of it farther.
+        let q = last.map_or(0.0, |l| dot(l, step) / dot(l, l));
+        last = Some(step);
+        if q > SLOW && q < 1.0 {
+            let n = add(best.normal, scale(q / (1.0 - q), step));
+            let far = measured(&a, b, scale(1.0 / norm(n), n));
+            if far.separation > best.separation {
+                (best, last) = (Meeting { on: best.on, ..far }, None);
+            }
         }
     }
     best
 }
 
 /// The separation along n.
-fn measured(a: &Side, b: &Side, n: Vec3) -> Meeting {
-    let (p, q) = (a.support(n), b.support(scale(-1.0, n)));
+pub(super) fn measured(a: impl Fn(Vec3) -> Vec3, b: &Side, n: Vec3) -> Meeting {
+    let (p, q) = (a(n), b.support(scale(-1.0, n)));
     Meeting { normal: n, separation: dot(n, sub(q, p)), on: [p, q] }
 }
 
@@ -385,7 +433,7 @@ fn measured(a: &Side, b: &Side, n: Vec3) -> Meeting {
 fn snapped(a: &Side, b: &Side, meeting: Meeting, size: f64) -> Meeting {
     let close = |n: &Vec3| norm(sub(*n, meeting.normal)) < 1e-3;
     for n in flats(a, b).filter(close) {
-        let now = measured(a, b, n);
+        let now = measured(|d| a.support(d), b, n);
         if now.separation >= meeting.separation - FLAT * size {
             return Meeting { normal: n, separation: now.separation, ..meeting };
         }
@@ -405,7 +453,7 @@ impl<'a> Side<'a> {
         }
     }
 
-    fn radius(&self) -> f64 {
+    pub fn radius(&self) -> f64 {
         if let Side::Rod { radius, .. } = self { *radius } else { 0.0 }
     }
 
@@ -478,14 +526,13 @@ impl<'a> Side<'a> {
             }
             Side::Turned { local, world, pose } => {
                 let k = (0..2).find(|&k| world.radii[k] > 0.0 && aligned(world.outwards(k)))?;
-                let centre = world.end(k);
                 Some(Flat {
                     feature: Feature::Face(k as u32),
                     normal: world.outwards(k),
                     local: local.outwards(k),
-                    point: centre,
+                    point: world.end(k),
                     pose,
-                    extent: Extent::Disc { centre, radius: world.radii[k] },
+                    extent: Extent::Disc { solid: world, end: k },
                 })
             }
             Side::Rod { .. } => None,
@@ -564,10 +611,12 @@ impl Flat<'_> {
                     }
                 }
             }
-            Extent::Disc { centre, radius } => {
+            Extent::Disc { solid, end } => {
+                let (centre, radius) = (solid.end(end), solid.radii[end]);
                 let across = |x: Vec3| sub(x, scale(dot(x, self.normal), self.normal));
                 let (o, d) = (across(sub(p, centre)), across(d));
-                let (a, b, c) = (dot(d, d), dot(d, o), dot(o, o) - radius * radius * (1.0 + 2e-9));
+                let (a, b, c) =
+                    (dot(d, d), dot(d, o), dot(o, o) - radius * radius * (1.0 + 2.0 * SAME_RIM));
                 if a <= 1e-28 * radius * radius {
                     return (c <= 0.0).then_some([low, high]);
                 }

@@ -11,9 +11,10 @@ use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 use crate::detect::broad::Aabb;
 use crate::detect::clip::Clip;
-use crate::detect::convex::Side;
+use crate::detect::convex::{Meeting, Side, climbed, measured};
+use crate::detect::gjk::closest;
 use crate::detect::segments::Segment;
-use crate::detect::surface::{NONE, Scratch, Surface, Thin};
+use crate::detect::surface::{CONE, NONE, Scratch, Surface, Thin};
 use crate::detect::witness::{Feature, Witness};
 use crate::rotation::Pose;
 
@@ -44,10 +45,12 @@ impl Foot {
 }
 
 impl Surface {
-    /// The points where a solid touches that overlaps the surface and that no triangle has met where it is deepest; `bounds` is the box of the solid, in the world.
+    /// The points where a solid touches that overlaps the surface and that no triangle has met where it is deepest; `bounds` is the box of the solid, in the world. With `is_cut`
+    /// triangles are near it, and none has met it where it overlaps the surface.
     pub(super) fn catch(
         &self,
         (pose, other, bounds): (&Pose, &Side, &Aabb),
+        is_cut: bool,
         prediction: f64,
         (clip, scratch): (&mut Clip, &mut Scratch),
         found: &mut impl FnMut([Feature; 2], Witness),
@@ -66,22 +69,75 @@ impl Surface {
             }
             return;
         }
-        // Above the surface the way from the middle to a point of the solid behind the triangle leads through that.
-        if !is_below && !foot.within {
-            return;
-        }
-        let reach = foot.far + other.size();
-        let wide =
-            Aabb { low: bounds.low.map(|x| x - reach), high: bounds.high.map(|x| x + reach) };
         let mut near = std::mem::take(&mut scratch.near);
-        self.near(pose, &wide, &mut near);
-        let face = self.faces[foot.triangle as usize];
-        for &t in near.iter().filter(|&&t| self.faces[t as usize] == face) {
-            self.template(t, pose, &mut scratch.thin);
-            let Thin { hull, posed } = &scratch.thin;
-            self.on_triangle((t, 0), ((hull, posed, pose), other), prediction, clip, &mut *found);
+        let mut caught = false;
+        // Above the surface the way from the middle to a point of the solid behind the triangle leads through that.
+        if is_below || foot.within {
+            let reach = foot.far + other.size();
+            let wide =
+                Aabb { low: bounds.low.map(|x| x - reach), high: bounds.high.map(|x| x + reach) };
+            self.near(pose, &wide, &mut near);
+            let face = self.faces[foot.triangle as usize];
+            for &t in near.iter().filter(|&&t| self.faces[t as usize] == face) {
+                self.template(t, pose, &mut scratch.thin);
+                let Thin { hull, posed } = &scratch.thin;
+                let both = ((hull, posed, pose), other);
+                self.on_triangle((t, 0), both, prediction, clip, |features, witness| {
+                    caught = true;
+                    found(features, witness);
+                });
+            }
+        }
+        if is_cut && !caught {
+            let outwards = match foot.within {
+                true => self.normals[foot.triangle as usize],
+                false if is_below => foot.outwards,
+                false => sub(middle, foot.at),
+            };
+            self.near(pose, bounds, &mut near);
+            self.cut((pose, other), &near, outwards, found);
         }
         scratch.near = near;
+    }
+
+    /// The point where a solid touches that triangles cut without a normal of the surface: where many thin ones meet, each is separated best along itself. All that are near together
+    /// separate along a normal that a climb finds, which begins outwards, a direction in the frame of the body.
+    fn cut(
+        &self,
+        (pose, other): (&Pose, &Side),
+        near: &[u32],
+        outwards: Vec3,
+        found: &mut impl FnMut([Feature; 2], Witness),
+    ) {
+        let at = |v: u32| self.vertices[v as usize];
+        let top = |corners: &mut dyn Iterator<Item = u32>, d: Vec3| {
+            corners.max_by(|&v, &w| dot(d, at(v)).total_cmp(&dot(d, at(w)))).unwrap_or(0)
+        };
+        let size = other.size().min(self.size);
+        let overlaps = |&t: &u32| {
+            let corners = self.triangles[t as usize];
+            let highest =
+                |d| pose.point(at(top(&mut corners.into_iter(), pose.local_direction(d))));
+            let start = sub(other.middle(), pose.point(at(corners[0])));
+            let c = closest(highest, |d| other.support(d), start, size);
+            c.is_none_or(|c| c.distance < other.radius())
+        };
+        if norm(outwards) == 0.0 || !near.iter().any(overlaps) {
+            return;
+        }
+        let corners = || near.iter().flat_map(|&t| self.triangles[t as usize]);
+        let highest = |d| pose.point(at(top(&mut corners(), pose.local_direction(d))));
+        let n = pose.direction(scale(1.0 / norm(outwards), outwards));
+        let Meeting { normal: n, on, .. } =
+            climbed(highest, other, measured(highest, other, n), size);
+        let normal = pose.local_direction(n);
+        let v = top(&mut corners(), normal);
+        if self.is_top(v, normal, CONE) {
+            let [s, t] = [on[0], sub(on[1], scale(other.radius(), n))];
+            let (s, t) = (pose.local_point(s), other.pose().local_point(t));
+            let witness = Witness::Points { s, t, normal, on_a: true };
+            found([Feature::Vertex(v), Feature::Curved(4)], witness);
+        }
     }
 
     /// False where x, in the frame of the body, is not inside: then a ray from there meets nothing. It goes up from below a heightfield, and else to the nearest side of the box about the mesh.

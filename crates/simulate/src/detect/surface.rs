@@ -361,7 +361,7 @@ impl Surface {
             }
             found(features, witness);
         };
-        self.meet((pose, other, bounds), prediction, (clip, scratch), note);
+        let is_near = self.meet((pose, other, bounds), prediction, (clip, scratch), note);
         // What is deep is met by some triangles at most, not where it is deepest.
         let is_all = deepest.is_some_and(|place| {
             let surface = sub(place.point, scale(0.5 * place.gap, place.normal));
@@ -369,18 +369,20 @@ impl Surface {
             lowest >= place.gap - SHALLOW * other.size()
         });
         if self.one_sided && !is_all {
-            self.catch((pose, other, bounds), prediction, (clip, scratch), &mut found);
+            let is_cut = is_near && deepest.is_none_or(|place| place.gap > 0.0);
+            let solid = (pose, other, bounds);
+            self.catch(solid, is_cut, prediction, (clip, scratch), &mut found);
         }
     }
 
-    /// The points where triangles near the other solid have normals of the surface.
+    /// The points where triangles near the other solid have normals of the surface; whether any triangle is near.
     fn meet(
         &self,
         (pose, other, bounds): (&Pose, &Side, &Aabb),
         prediction: f64,
         (clip, scratch): (&mut Clip, &mut Scratch),
         mut found: impl FnMut([Feature; 2], Witness),
-    ) {
+    ) -> bool {
         let mut near = std::mem::take(&mut scratch.near);
         self.near(pose, bounds, &mut near);
         if let Side::Rod { local, world, radius, .. } = other
@@ -390,11 +392,15 @@ impl Surface {
                 self.ball(t, (local.p, pose.local_point(world.p), *radius), &mut found);
             }
             scratch.near = near;
-            return;
+            return false;
         }
+        let mut any = false;
+        scratch.met.clear();
+        scratch.held.clear();
         for &t in &near {
             self.template(t, pose, &mut scratch.thin);
-            let Scratch { thin: Thin { hull, posed }, found: list, .. } = &mut *scratch;
+            let Scratch { thin: Thin { hull, posed }, found: list, met: points, held, .. } =
+                &mut *scratch;
             list.clear();
             let triangle = Side::Hull { hull, posed, pose };
             // The side of the triangle that separates, if one does.
@@ -415,12 +421,14 @@ impl Surface {
                     (convex::collide(&triangle, other, prediction, push), None)
                 }
             };
+            any |= is_near;
             // Whether the surface is met here, with a normal of another triangle or solid that it does not have, or at a point of a plane.
             let (mut met, mut foreign, mut inner) = (false, false, false);
             let count = list.len();
             for ([feature, own], witness) in list.drain(..) {
-                let n = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).normal;
-                let n = pose.local_direction(n);
+                let Place { normal, point, .. } =
+                    witness.place(pose, other.pose(), [0.0, 0.0, 1.0]);
+                let n = pose.local_direction(normal);
                 let front = dot(n, self.normals[t as usize]);
                 let facing =
                     if self.one_sided { front } else { front.abs() } > 1.0 - FACING * FACING;
@@ -443,6 +451,7 @@ impl Surface {
                     *(if by == Some(true) { &mut met } else { &mut inner }) = true;
                 } else {
                     met = true;
+                    points.push(point);
                     found([feature, own], witness);
                 }
             }
@@ -458,15 +467,34 @@ impl Surface {
             let middle = other.middle();
             let behind = dot(posed.normals[0], middle) < posed.offsets[0];
             let face = usize::from(behind && !self.one_sided);
+            // What goes on far below the plane of the triangle does not lie on it: where it is met with another normal, that is the one.
+            let n = posed.normals[face];
+            let lowest = dot(n, other.lowest(n)) - posed.offsets[face];
             let keep = |features: [Feature; 2], witness: Witness| {
-                if witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).gap >= deepest {
+                let Place { gap, point, .. } = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]);
+                if gap < deepest {
+                    return;
+                }
+                if self.one_sided && lowest < gap - SLOPE * other.size() {
+                    held.push((gap, features, witness));
+                } else {
+                    points.push(point);
                     found(features, witness);
                 }
             };
             let both = ((&*hull, &*posed, pose), other);
             self.on_triangle((t, face), both, prediction, clip, keep);
         }
+        let Scratch { met: points, held, .. } = scratch;
+        let reach = DEEP * other.size();
+        for (_, features, witness) in held.drain(..) {
+            let x = witness.place(pose, other.pose(), [0.0, 0.0, 1.0]).point;
+            if !points.iter().any(|&p| norm(sub(p, x)) <= reach) {
+                found(features, witness);
+            }
+        }
         scratch.near = near;
+        any
     }
 
     /// Where the other solid is nearer than `prediction` to a side of triangle t, of which `face` is its number, along the normal of that; points of planes are left out.

@@ -606,39 +606,110 @@ fn flat_ends_and_lines_touch_as_wholes() {
     }
 }
 
+#[test]
+fn round_ends_touch_all_over_what_they_share() {
+    let base = |radius: f64| Part::new(Shape::Cone { half_length: 0.5, radius });
+    let over = Rotation::about([1.0, 0.0, 0.0], std::f64::consts::PI);
+    let angles = |k: u32| f64::from(k) * std::f64::consts::TAU / 360.0;
+    for (below, above, off) in [
+        (0.2, 0.5, 0.0),
+        (0.2, 0.5, 0.1),
+        (0.2, 0.5, 0.4),
+        (0.5, 0.2, 0.4),
+        (0.5, 0.5, 0.0),
+        (0.5, 0.5, 1e-9),
+        (0.5, 0.5, 1e-7),
+        (0.5, 0.5, 0.1),
+        (0.5, 0.5, 0.4),
+        (0.45, 0.5, 0.2),
+        (0.3, 0.300_000_1, 0.0),
+    ] {
+        // Both rims, and what of them lies in the other end too.
+        let centres = [[0.0; 3], [off, 0.0, 0.0]];
+        let from = |k: usize, x: Vec3| (x[0] - centres[k][0]).hypot(x[1]);
+        let rim = |k: usize, r: f64| {
+            (0..360).map(angles).map(move |t| add(centres[k], [r * t.cos(), r * t.sin(), 0.0]))
+        };
+        let both = |x: &Vec3| from(0, *x) <= below + 1e-9 && from(1, *x) <= above + 1e-9;
+        let shared: Vec<Vec3> = rim(0, below).chain(rim(1, above)).filter(both).collect();
+        for (lower, upper) in [
+            (Body::fixed(vec![base(below)]).turned(over), solid(base(above).shape)),
+            (
+                Body::fixed(vec![Part::new(Shape::Cylinder { half_length: 0.5, radius: below })]),
+                cylinder(0.5, above),
+            ),
+        ] {
+            // The centre of mass of a cone is half as high above the base.
+            let high = 0.5 - upper.parts[0].position[2];
+            let upper = upper.at([off, 0.0, 0.5 + high - 1e-3]);
+            for swapped in [false, true] {
+                let (a, b) = (lower.clone(), upper.clone());
+                let found = contacts(&if swapped { two(b, a) } else { two(a, b) });
+                assert!(found.len() >= 4 && found.len() <= 18, "{below} {above} {off} {found:#?}");
+                for near in &found {
+                    let x = near.place.point;
+                    assert!((near.place.gap + 1e-3).abs() < 1e-12, "{near:?}");
+                    assert!(from(0, x) < below + 1e-6 && from(1, x) < above + 1e-6, "{near:?}");
+                }
+                for t in (0..360).map(angles) {
+                    let along = |x: &Vec3| x[0] * t.cos() + x[1] * t.sin();
+                    let most = |xs: &mut dyn Iterator<Item = Vec3>| {
+                        xs.map(|x| along(&x)).fold(f64::NEG_INFINITY, f64::max)
+                    };
+                    let reached = most(&mut found.iter().map(|n| n.place.point));
+                    let whole = most(&mut shared.iter().copied());
+                    // An eighth of a rim is higher than its chord by no more.
+                    let rise = 0.08 * f64::max(below, above);
+                    assert!(reached > whole - rise, "{below} {above} {off} {t} {reached} {whole}");
+                }
+            }
+        }
+    }
+    // Inclined by so little that the other end is the face, the points are the same.
+    let names = |lean: f64| -> Vec<Key> {
+        let turn = Rotation::about([0.0, 1.0, 0.0], lean);
+        let table = cylinder(0.05, 0.5).turned(turn).at([0.0, 0.0, 0.55]);
+        contacts(&two(cylinder(0.5, 0.2), table)).iter().map(|n| n.key).collect()
+    };
+    assert_eq!(names(0.0).len(), 8);
+    assert!(names(3e-6).iter().filter(|k| names(0.0).contains(k)).count() == 8);
+}
+
+/// The point of a convex body that is farthest along d.
+fn farthest(body: &Body, d: Vec3) -> Vec3 {
+    let r = body.rotation.matrix();
+    let pose = Pose { x: body.position, r };
+    let d = pose.local_direction(d);
+    let part = &body.parts[0];
+    let flat = d[0].hypot(d[1]).max(1e-300);
+    let out = |r: f64| [r * d[0] / flat, r * d[1] / flat];
+    let local = match &part.shape {
+        Shape::Cylinder { half_length, radius } => {
+            let [x, y] = out(*radius);
+            [x, y, half_length * d[2].signum()]
+        }
+        Shape::Cone { half_length, radius } => {
+            let [x, y] = out(*radius);
+            let base = [x, y, -half_length];
+            let point = [0.0, 0.0, *half_length];
+            if dot(base, d) > dot(point, d) { base } else { point }
+        }
+        Shape::Capsule { half_length, radius } => {
+            add([0.0, 0.0, half_length * d[2].signum()], scale(*radius, normalise(d)))
+        }
+        Shape::Box { half } => std::array::from_fn(|i| half[i] * d[i].signum()),
+        Shape::Polyhedron(p) => {
+            let by = |v: &Vec3| dot(*v, d);
+            *p.vertices().iter().max_by(|v, w| by(v).total_cmp(&by(w))).unwrap()
+        }
+        _ => unreachable!(),
+    };
+    pose.point(add(part.position, local))
+}
+
 /// The largest separation of two convex shapes along any direction, by search.
 fn searched(world: &World, rng: &mut Pcg64) -> f64 {
-    let support = |k: usize, d: Vec3| -> Vec3 {
-        let body = &world.bodies[k];
-        let r = body.rotation.matrix();
-        let pose = Pose { x: body.position, r };
-        let d = pose.local_direction(d);
-        let part = &body.parts[0];
-        let flat = d[0].hypot(d[1]).max(1e-300);
-        let out = |r: f64| [r * d[0] / flat, r * d[1] / flat];
-        let local = match &part.shape {
-            Shape::Cylinder { half_length, radius } => {
-                let [x, y] = out(*radius);
-                [x, y, half_length * d[2].signum()]
-            }
-            Shape::Cone { half_length, radius } => {
-                let [x, y] = out(*radius);
-                let base = [x, y, -half_length];
-                let point = [0.0, 0.0, *half_length];
-                if dot(base, d) > dot(point, d) { base } else { point }
-            }
-            Shape::Capsule { half_length, radius } => {
-                add([0.0, 0.0, half_length * d[2].signum()], scale(*radius, normalise(d)))
-            }
-            Shape::Box { half } => std::array::from_fn(|i| half[i] * d[i].signum()),
-            Shape::Polyhedron(p) => {
-                let by = |v: &Vec3| dot(*v, d);
-                *p.vertices().iter().max_by(|v, w| by(v).total_cmp(&by(w))).unwrap()
-            }
-            _ => unreachable!(),
-        };
-        pose.point(add(part.position, local))
-    };
+    let support = |k: usize, d: Vec3| farthest(&world.bodies[k], d);
     let separation = |n: Vec3| dot(n, sub(support(1, scale(-1.0, n)), support(0, n)));
     let mut starts: Vec<(f64, Vec3)> = (0..300)
         .map(|_| {
@@ -664,6 +735,33 @@ fn searched(world: &World, rng: &mut Pcg64) -> f64 {
         best = best.max(value);
     }
     best
+}
+
+#[test]
+fn round_solids_that_nearly_touch_are_as_far_apart_as_they_are() {
+    let mut rng = Pcg64::seed_from_u64(41);
+    for round in 0..300 {
+        let shape = |kind: usize, rng: &mut Pcg64| -> Body {
+            let mut x = || rng.random_range(0.3..0.8);
+            match kind {
+                0 => cylinder(x(), x()),
+                1 => cone(x(), x()),
+                _ => cuboid([x(), x(), x()]),
+            }
+        };
+        let a = shape(round % 2, &mut rng).turned(rotation(&mut rng)).at([0.0; 3]);
+        let b = shape(round % 3, &mut rng).turned(rotation(&mut rng)).at([0.0; 3]);
+        let n = normalise(vector(&mut rng, 1.0));
+        let at = sub(farthest(&a, n), farthest(&b, scale(-1.0, n)));
+        for gap in [1e-3, 1.1e-4, 9e-5, 1e-5, 1e-6, -1e-6, -1e-5, -1e-4] {
+            let found = gaps(&two(a.clone(), b.clone().at(add(at, scale(gap, n)))));
+            assert!(!found.is_empty(), "{round} {gap}");
+            // Solids that overlap along one normal may do so by less along another.
+            let error = found[0] - gap;
+            assert!(error > -1e-2 * gap.abs(), "{round} {gap} {found:?}");
+            assert!(gap < 0.0 || error < 1e-4 * gap, "{round} {gap} {found:?}");
+        }
+    }
 }
 
 #[test]
@@ -899,6 +997,53 @@ fn a_mesh_of_a_box_touches_as_the_box() {
     assert!(touching > 60 && 10 * same > 8 * touching, "{same} of {touching}");
     // On a plane it stands on its corners, not on points inside its faces.
     assert_eq!(gaps(&two(Body::floor(), solid(crate_mesh(half)).at([0.0, 0.0, 0.31]))).len(), 4);
+}
+
+#[test]
+fn a_corner_on_an_edge_of_a_mesh_is_not_met_by_the_faces_beside_it() {
+    let mut rng = Pcg64::seed_from_u64(67);
+    let mut seen = 0;
+    for round in 0..120 {
+        let [x, y] = [0.0; 2].map(|_: f64| rng.random_range(0.3..1.0));
+        let (n, depth) = (normalise([x, y, 0.0]), [1e-7, 1e-5, 1e-3][round % 3]);
+        let rest = sub([0.5, 0.5, rng.random_range(-0.4..0.4)], scale(depth, n));
+        let body = cuboid([0.4, 0.3, 0.2]).turned(rotation(&mut rng));
+        let body = body.clone().at(sub(rest, farthest(&body, scale(-1.0, n))));
+        let block = cuboid([0.5; 3]);
+        for near in contacts(&two(solid(crate_mesh([0.5; 3])), body.clone())) {
+            // Along its normal the bodies overlap by no more than a slope's worth of their size.
+            let m = near.place.normal;
+            let apart = dot(m, sub(farthest(&body, scale(-1.0, m)), farthest(&block, m)));
+            assert!(near.place.gap > 0.0 || apart > -0.1, "{round} {apart} {near:?}");
+            seen += usize::from(near.place.gap < 0.0);
+        }
+    }
+    assert!(seen >= 120, "{seen}");
+}
+
+#[test]
+fn rims_and_points_that_have_sunk_into_a_mesh_touch_it() {
+    let mut rng = Pcg64::seed_from_u64(53);
+    for round in 0..400 {
+        let p = rock(&mut rng, if round % 3 == 0 { 6 } else { 12 });
+        let faces: Vec<_> = p.faces().iter().map(|f| [f[0], f[1], f[2]]).collect();
+        let mesh = crate::Mesh::new(p.vertices(), &faces).unwrap();
+        let (turn, n) = (rotation(&mut rng), normalise(vector(&mut rng, 1.0)));
+        let [x, y] = [0.0; 2].map(|_: f64| rng.random_range(0.3..0.6));
+        let body = if round % 2 == 0 { cylinder(x, y) } else { cone(x, y) };
+        let body = body.turned(turn).at([0.0; 3]);
+        let fixed = |shape: Shape| Body::fixed(vec![Part::new(shape)]);
+        let hull = fixed(Shape::from(p));
+        // By a hundredth of its size, without any motion.
+        let rest = add(farthest(&hull, n), scale(-0.005, n));
+        let body = body.clone().at(sub(rest, farthest(&body, scale(-1.0, n))));
+        let least = |world: World| gaps(&world).first().copied();
+        let as_hull = least(two(hull, body.clone())).expect("they overlap");
+        let as_mesh = least(two(fixed(Shape::from(mesh)), body));
+        if as_hull < -1e-4 {
+            assert!(as_mesh.is_some(), "{round} {as_hull}");
+        }
+    }
 }
 
 #[test]

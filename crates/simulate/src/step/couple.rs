@@ -31,6 +31,9 @@ pub(super) trait Sided<const D: usize>: Copy + Default + Send + Sync {
     /// Component i of the relative velocity that the body makes with these velocities.
     fn velocity(&self, i: usize, of: (Vec3, Vec3)) -> f64;
 
+    /// The terms of that, of whichever component they are largest.
+    fn terms(&self, of: (Vec3, Vec3)) -> f64;
+
     /// The same with velocities as six numbers.
     fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64;
 
@@ -68,6 +71,12 @@ impl Sided<3> for Side {
 
     fn velocity(&self, i: usize, (v, spin): (Vec3, Vec3)) -> f64 {
         (0..3).map(|k| self.rows[k][i] * v[k] + self.rows[3 + k][i] * spin[k]).sum()
+    }
+
+    fn terms(&self, (v, spin): (Vec3, Vec3)) -> f64 {
+        let most = |row: &[f64; 4]| row[0].abs().max(row[1].abs()).max(row[2].abs());
+        let each = self.rows.iter().zip(v.iter().chain(&spin));
+        each.map(|(row, v)| most(row) * v.abs()).sum()
     }
 
     fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64 {
@@ -114,6 +123,11 @@ impl Sided<2> for FlatSide {
 
     fn velocity(&self, i: usize, (v, spin): (Vec3, Vec3)) -> f64 {
         self.rows[0][i] * v[0] + self.rows[1][i] * v[1] + self.rows[2][i] * spin[2]
+    }
+
+    fn terms(&self, (v, spin): (Vec3, Vec3)) -> f64 {
+        let each = self.rows.iter().zip([v[0], v[1], spin[2]]);
+        each.map(|(row, v)| row[0].abs().max(row[1].abs()) * v.abs()).sum()
     }
 
     fn rate(&self, i: usize, velocities: &[f64; 6]) -> f64 {

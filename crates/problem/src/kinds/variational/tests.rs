@@ -224,6 +224,41 @@ fn a_far_plane_changes_no_projection() {
     }
 }
 
+/// At a vertex with more rows than unknowns, and an equation through it, what rounding leaves of the rows contradicts nothing.
+#[test]
+fn a_vertex_of_many_rows_is_projected_onto() {
+    let csc = |rows: &[[f64; 2]]| {
+        let entries = rows.iter().enumerate().flat_map(|(i, r)| [(i, 0, r[0]), (i, 1, r[1])]);
+        Csc::from_triplets(rows.len(), 2, entries).unwrap()
+    };
+    let at = |rows: &[[f64; 2]], x: [f64; 2]| -> Vec<f64> {
+        rows.iter().map(|r| r[0] * x[0] + r[1] * x[1]).collect()
+    };
+    let mut random = Pcg64::seed_from_u64(3);
+    for round in 0..400 {
+        let mut row = || [0; 2].map(|_| f64::from(random.random_range(-3..4)));
+        let rows: Vec<_> = (0..3 + round % 4).map(|_| row()).filter(|r| *r != [0.0; 2]).collect();
+        let equations: Vec<_> = (0..round % 2).map(|_| row()).filter(|r| *r != [0.0; 2]).collect();
+        let vertex = row();
+        let set = Set::Polyhedron {
+            A: csc(&rows),
+            b: at(&rows, vertex),
+            C: csc(&equations),
+            d: at(&equations, vertex),
+        };
+        for off in [0.0, 1e-16, 1e-15, 1e-12, 1e-9, 1e-6, 1e-3, 1.0] {
+            let way = row();
+            let p = [vertex[0] + off * way[0], vertex[1] + off * way[1]];
+            let y = projected(&set, &p).unwrap_or_else(|| panic!("{round}, {off:e}: {set:?}"));
+            let far = |z: [f64; 2]| (p[0] - z[0]).hypot(p[1] - z[1]);
+            // A few roundings, over the sine of the angle between two rows.
+            assert!(far([y[0], y[1]]) <= far(vertex) + 1e-13, "{round}, {off:e}: {y:?}");
+            let beyond = at(&rows, [y[0], y[1]]).into_iter().zip(at(&rows, vertex));
+            assert!(beyond.fold(0.0, |most: f64, (a, b)| most.max(a - b)) < 1e-13, "{y:?}");
+        }
+    }
+}
+
 /// From whatever start over a set without a size, of a function that cannot be asked at zero.
 #[test]
 fn no_start_makes_the_errors_of_a_function_small() {

@@ -4,7 +4,7 @@
 
 use nonsmooth_problem::check::Kinematic;
 
-use super::starts::{Halvings, INTERIOR, INTERIOR_IDLE, INTERIOR_MARGIN, lost, take};
+use super::starts::{Halvings, INTERIOR, INTERIOR_IDLE, inside, lost, take};
 use super::{Auto, Done, HybridWork, Stage};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
@@ -44,7 +44,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         if relaxes {
             inner_best.copy_from_slice(r);
             done.relaxed_error = f64::INFINITY;
-            let now = central.begin_relaxed(problem, state, Some((&*r, INTERIOR_MARGIN)));
+            let now = central.begin_relaxed(problem, state, inside::<P::Law, D>(r));
             *stage = Stage::Relaxed { halvings: Halvings::from(now.error) };
         } else {
             self.subproblem_here(problem, point, work);

@@ -1,7 +1,7 @@
 //! The stages between the sweeps and the proximal steps, each of which ends many problems and makes a start for the others; and alternating directions, for
 //! those that the proximal steps take long for.
 
-use nonsmooth_problem::check::Kinematic;
+use nonsmooth_problem::check::{Kinematic, Law};
 
 use super::controller::Controller;
 use super::proximal_newton::ProximalNewton;
@@ -45,7 +45,7 @@ const SWEEP_AGAIN: f64 = 3.0;
 /// of bodies it takes some 20 iterations to come into sight of the solution, and ten to reach it.
 pub(super) const INTERIOR: usize = 60;
 /// It begins at the point's impulses and their velocities, so far inside the cones, in units of the mean load a contact: nearer to the boundary its steps are cut short.
-pub(super) const INTERIOR_MARGIN: f64 = 0.7;
+const INTERIOR_MARGIN: f64 = 0.7;
 /// Where Newton's iterations promise to take longer than this, the interior point is worth a trial; not before so many, which is what one subproblem in vain takes.
 const INTERIOR_COST: f64 = 20.0;
 const IN_VAIN: usize = 12;
@@ -622,6 +622,12 @@ pub(super) fn has_spread<P: Linearised<D> + Disked<D>, const D: usize>(
     *spread.get_or_insert_with(|| problem.spread(state, units) >= SPREAD)
 }
 
+/// Where an interior point begins that knows impulses: near them, or, with two disks a contact, at the cones' units all the same. Two cones that share their normal impulse
+/// cannot both be as far from their boundaries as they have to.
+pub(super) fn inside<L: Law<D>, const D: usize>(r: &[f64]) -> Option<(&[f64], f64)> {
+    (L::DISKS == 1).then_some((r, INTERIOR_MARGIN))
+}
+
 /// Begins stage 4, near impulses or at the cones' units.
 pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     problem: &P,
@@ -631,8 +637,7 @@ pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     work.passed_by = None;
     let HybridWork { central, state, stage, .. } = work;
     let central = central.get_or_insert_with(interior_point);
-    let start = near.map(|r| (r, INTERIOR_MARGIN));
-    let now = central.begin(problem, state, 0.0, start);
+    let now = central.begin(problem, state, 0.0, near.and_then(inside::<P::Law, D>));
     *stage = Stage::Interior { halvings: Halvings::from(now.error), short: 0 };
 }
 

@@ -128,9 +128,10 @@ impl Pair {
         }
     }
 
-    pub(crate) fn degenerate(&self, tolerance: f64) -> bool {
+    /// Whether w is zero and z on a bound, within the tolerance.
+    pub(crate) fn vanishes(&self, tolerance: f64) -> bool {
         let nearest = (self.z - self.l).abs().min((self.u - self.z).abs());
-        self.l < self.u && self.error <= tolerance && distance(nearest, self.effect) <= tolerance
+        self.error <= tolerance && distance(nearest, self.effect) <= tolerance
     }
 
     /// z between its bounds, and on the one that w asks for where that is no worse than to let z be.
@@ -439,6 +440,9 @@ pub struct RowCounts {
     pub equalities: usize,
     /// Pairs, counted above as well, that are zero on both sides within the tolerance.
     pub degenerate: usize,
+    /// As `degenerate`, and not among those, of pairs with equal bounds: the solution stays as it is, but follows the one bound or the other.
+    #[serde(skip)]
+    pub fixed: usize,
 }
 
 /// From each row's pair, or the error of an equality.
@@ -454,7 +458,9 @@ pub(crate) fn verdict(
         let (status, error) = match row {
             Err(error) => (RowStatus::Equality, error),
             Ok(pair) => {
-                counts.degenerate += usize::from(pair.degenerate(tolerance));
+                let vanishing = usize::from(pair.vanishes(tolerance));
+                let of = if pair.l < pair.u { &mut counts.degenerate } else { &mut counts.fixed };
+                *of += vanishing;
                 (pair.status(), pair.worst())
             }
         };

@@ -7,6 +7,7 @@ use super::Mcp;
 use crate::LcpPoint;
 use crate::Problem;
 use crate::check::{Measure, RowCounts, RowStatus, Verdict};
+use crate::field::tentatively;
 
 /// The judge's constants and buffers for a nonlinear problem.
 ///
@@ -17,7 +18,7 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// part: a start far off, or near a pole at zero, makes nothing small. Of a row that along a change of x by a
 /// thousandth does not change as J says, that change counts in place of the terms that it should have had. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the modulus of
-/// that bound. Therefore neither changes when rows or variables are multiplied by numbers.
+/// that bound, or, beyond it, over the larger of `|x_j|` and its modulus alone. Therefore neither changes when rows or variables are multiplied by numbers.
 ///
 /// | field of [`Measure`] | formula |
 /// | --- | --- |
@@ -25,7 +26,7 @@ use crate::check::{Measure, RowCounts, RowStatus, Verdict};
 /// | `dual` | the largest error of an F whose sign no bound allows |
 /// | `complementarity` | the largest error of a pair: the smaller of that of F and that of the distance from the bound that the sign of F asks for |
 /// | `relative` | the largest of the three; **decides** |
-/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing; where the error is that of a distance, the smaller of that of F and the distance over the larger of `|start_j|` and the modulus of the bound |
+/// | `own` | the largest `|F_i|` of those errors in units of ω_i (near zero beyond what the last bits of x make of it): x that runs away excuses nothing; where the error is that of a distance, the smaller of that of F and the distance over the larger of `|start_j|` and the modulus of the bound, and all errors at the point with these variables on their bounds, the distances by what they do there |
 /// | `absolute`, `literature`, `siconos` | the natural residual `‖x − mid(l, u, x − F(x))‖_∞` |
 ///
 /// [`certify`](Problem::certify) evaluates sums, products, quotients and roots of expressions in doubled precision.
@@ -38,12 +39,17 @@ pub struct McpGauge {
     lengths: Vec<f64>,
     /// What a distance counts at the point last measured.
     effects: Vec<f64>,
+    /// That point with the variables on their bounds whose distance from them is their error.
+    bounded: Vec<f64>,
 }
 
 /// The unit of a variable, but for its own value: the larger of its start and a bound.
 fn unit_of(start: f64, bound: f64) -> f64 {
     if bound.is_finite() { start.max(bound.abs()) } else { start }
 }
+
+/// No tolerance is larger: F is not asked on the bounds at points that no one accepts.
+const LOOSEST: f64 = 0.1;
 
 impl McpGauge {
     pub(super) fn new(problem: &Mcp) -> Self {
@@ -59,12 +65,13 @@ impl McpGauge {
             scales: vec![0.0; n],
             lengths: start.iter().map(|s| s.abs()).collect(),
             effects: vec![0.0; n],
+            bounded: vec![0.0; n],
         }
     }
 
     /// F, D and what distances count at x. False where F is not defined.
     fn look(&mut self, problem: &Mcp, x: &[f64], precisely: bool) -> bool {
-        let Self { terms, scales, units, lengths, effects } = self;
+        let Self { terms, scales, units, lengths, effects, .. } = self;
         let pattern = problem.F.pattern();
         if !units.look(&*problem.F, terms, x, precisely) {
             scales.fill(0.0);
@@ -82,9 +89,13 @@ impl McpGauge {
             }
         }
         for (j, effect) in effects.iter_mut().enumerate().filter(|(_, e)| **e == 0.0) {
-            // A bound that nothing asks for, however far, makes no distance small.
+            // A bound that nothing asks for, however far, makes no distance small; nor does a start what lies beyond a bound.
+            let nearest = x[j].max(problem.lower[j]).min(problem.upper[j]);
             let towards = if terms.f[j] > 0.0 { problem.lower[j] } else { problem.upper[j] };
-            let length = unit_of(lengths[j], towards).max(x[j].abs());
+            let length = match nearest == x[j] {
+                true => unit_of(lengths[j], towards).max(x[j].abs()),
+                false => nearest.abs().max(x[j].abs()),
+            };
             *effect = if length > 0.0 { 1.0 / length } else { 0.0 };
         }
         true
@@ -109,6 +120,8 @@ impl McpGauge {
             ..Measure::never()
         };
         let mut own: f64 = 0.0;
+        let mut bounded = std::mem::take(&mut self.bounded);
+        bounded.clone_from(x);
         for i in 0..x.len() {
             let pair = self.pair(problem, x, i);
             let residual = natural(x[i], pair.w, pair.l, pair.u).abs();
@@ -122,6 +135,8 @@ impl McpGauge {
             }
             // The error of F, where that is the error of the pair.
             let of_f = pair.dual().max(pair.complementarity());
+            bounded[i] = if of_f < pair.error { pair.towards() } else { x[i] };
+            bounded[i] = bounded[i].max(pair.l).min(pair.u);
             let (unit, near) = self.units.at(i, self.terms.sizes[i]);
             if unit.is_nan() || unit <= 0.0 {
                 continue;
@@ -142,12 +157,37 @@ impl McpGauge {
                 (own, measure.own_contact) = (share_of_own, Some(i));
             }
         }
+        measure.floor = precisely.then(|| self.floor(problem, x));
+        let passes = [measure.primal, measure.dual, measure.complementarity];
+        if precisely && bounded != *x && passes.into_iter().all(|error| error <= LOOSEST) {
+            let (there, worst) = self.at_bounds(problem, x, &bounded);
+            if there > own {
+                (own, measure.own_contact) = (there, Some(worst));
+            }
+        }
+        self.bounded = bounded;
         // What is not known cannot be held against the point, nor the point be accepted without it.
         measure.own = Some(if precisely && self.units.cut_short { NEVER } else { own });
         measure.relative = worse(worse(measure.primal, measure.dual), measure.complementarity);
         (measure.literature, measure.siconos) = (measure.absolute, measure.absolute);
-        measure.floor = precisely.then(|| self.floor(problem, x));
         measure
+    }
+
+    /// The largest error at the point y with variables of x on their bounds, or distance from x by what it does there, and its row: where F hardly feels a distance, as in the flat
+    /// tail of an exponential, it may yet be another on the bound. Nothing where F is not defined there.
+    fn at_bounds(&mut self, problem: &Mcp, x: &[f64], y: &[f64]) -> (f64, usize) {
+        let mut worst = (0.0, 0);
+        if tentatively(|| self.look(problem, y, true)) {
+            for i in 0..y.len() {
+                let moved = share((x[i] - y[i]).abs() * self.effects[i], 1.0);
+                let error = self.pair(problem, y, i).worst().max(moved);
+                worst = if error > worst.0 { (error, i) } else { worst };
+            }
+        }
+        let cut_short = self.units.cut_short;
+        self.look(problem, x, true);
+        self.units.cut_short |= cut_short;
+        worst
     }
 
     /// Row i at the point last looked at.

@@ -277,6 +277,41 @@ fn far_bounds_and_extreme_starts_make_no_error_small() {
     }
 }
 
+/// Where F hardly feels a distance from a bound, as in a flat tail, F may be another on the bound, or feel it there.
+#[test]
+fn a_flat_tail_makes_no_distance_small() {
+    let inf = f64::INFINITY;
+    for (f, [lower, upper], start, wrong, right) in [
+        ("0.4 - exp(-2.2*(x + 0.0023)^2)", [0.0, inf], 0.0, 3.7055, 0.643_064_848_140_588_6),
+        ("0.25 - exp(-(x + 0.002)^2)", [0.0, inf], 0.0, 5.86, 4f64.ln().sqrt() - 0.002),
+        ("exp(-(x - 0.002)^2) - 0.25", [-inf, 0.0], 0.0, -5.86, 0.002 - 4f64.ln().sqrt()),
+        (
+            "0.3 - 1/(1 + (x + 0.1)^6)",
+            [0.0, inf],
+            0.0,
+            1.1e4,
+            (0.7_f64 / 0.3).powf(1.0 / 6.0) - 0.1,
+        ),
+        ("(x - 1)^9 + 0.4", [0.0, inf], 1.02, 1.02, 1.0 - 0.4_f64.powf(1.0 / 9.0)),
+        ("2*x^3 - 5.4*x^2 + 4.8*x - 1", [0.0, inf], 1000.0, 1.0, 0.296_215_085_956_981_8),
+        // Beyond a bound.
+        ("1 + x^2", [1.0, inf], 1e9, 0.0, 1.0),
+        ("1 + (x + 1)^2", [0.0, inf], 1e9, -1.0, 0.0),
+        ("1 + (x + 1)^2", [0.0, inf], 1e9, -1.0 + 1e-9, 1e-12),
+        ("1 + 0*x", [1.0, inf], 1e9, 0.0, 1.0),
+        // Near a bound.
+        ("1 + x", [0.0, inf], 0.0, 1e-7, 1e-12),
+        ("-1 + x", [-inf, 0.5], 0.0, 0.5 - 1e-7, 0.5 - 1e-12),
+    ] {
+        let field = Expressions::parse(&[f.into()], &["x".into()]).unwrap();
+        let problem = Mcp::new(field, vec![lower], vec![upper], vec![start]).unwrap();
+        let mut gauge = problem.gauge().unwrap();
+        let mut judged = |x: f64| problem.certify(&LcpPoint { z: vec![x] }, &mut gauge);
+        assert!(!judged(wrong).passes(1e-8), "{f} at {wrong}: {:?}", judged(wrong));
+        assert!(judged(right).passes(1e-8), "{f} at {right}: {:?}", judged(right));
+    }
+}
+
 /// Nor a start far off where F ends on the way to zero: its rows are as large as they are up to there.
 #[test]
 fn where_f_ends_no_error_is_small() {

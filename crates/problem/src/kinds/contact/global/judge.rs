@@ -371,9 +371,13 @@ impl GlobalGauge {
         measure.velocity_gap = Some(over(rows.norm(), law.norm_q));
 
         if let Some(b) = &problem.rows {
-            // |Gᵀ v + b|, or what the bounds make of it, against its terms, beyond what the rounding of velocities of a typical size makes of them.
+            // |Gᵀ v + b|, or what the bounds make of it, against its terms, beyond what the rounding of velocities of a typical size makes of them: at rest these are what is
+            // left of the forces' terms.
             let unit = |i: usize| unit(problem.M.get(i, i));
-            let typical = (0..n).fold(0.0_f64, |t, i| t.max(point.v[i].abs() * unit(i)));
+            let of_motion = point.v.iter().zip(load.sizes()).enumerate();
+            let of_motion = of_motion.map(|(i, (v, f))| (v.abs() * unit(i)).max(f / unit(i)));
+            let of_rows = b.G.triplets().map(|(i, j, g)| (g * point.lambda[j]).abs() / unit(i));
+            let typical = of_motion.chain(of_rows).fold(0.0, f64::max);
             rows.start(&b.b);
             rows.add_transposed(&b.G, &point.v);
             let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, &size))| {

@@ -30,6 +30,9 @@ pub(in super::super) struct Projection {
 /// A plane is no farther away, in units of what is violated, so that nothing overflows.
 const FARTHEST: f64 = 1e100;
 
+/// A point is in the set where rows contradict each other, if they exceed by no more than so many times what rounding makes of an excess.
+const WITHIN: f64 = 16.0;
+
 /// Excesses smaller than this, in units of the row's terms, are those of a row on which a point lies.
 const ON: f64 = 1e-7;
 
@@ -129,8 +132,15 @@ impl Projection {
         let Self { rows, norms, equalities, passive, .. } = self;
         let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
         let rhs = b.iter().map(|b| -b).chain(d.iter().copied());
-        let h = |(k, rhs): (usize, f64)| rhs / norms[k] - dot(&rows[k], p);
-        let mut h: Vec<f64> = rhs.enumerate().map(h).collect();
+        // What rounding leaves of a row on which p lies is no violation: at a vertex with more rows than unknowns these would contradict each other.
+        let rounding = (n + 3) as f64 * f64::EPSILON;
+        let h = |(k, rhs): (usize, f64)| {
+            let at = rhs / norms[k];
+            let noise = rounding * (at.abs() + dot_moduli(&rows[k], p));
+            let h = at - dot(&rows[k], p);
+            (if h.abs() <= noise { 0.0 } else { h }, noise)
+        };
+        let (mut h, mut noise): (Vec<f64>, Vec<f64>) = rhs.enumerate().map(h).unzip();
         y.copy_from_slice(p);
         // The unit is what p violates: beside a plane that is far away all that would be rounding.
         let violations = h.iter().enumerate().map(|(k, h)| if k < bounds { *h } else { h.abs() });
@@ -140,6 +150,7 @@ impl Projection {
             return true;
         }
         h.iter_mut().for_each(|h| *h = (*h / size).max(-FARTHEST));
+        noise.iter_mut().for_each(|noise| *noise /= size);
         let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
         let is_on = |&k: &usize| {
             let at = b[k] / norms[k];
@@ -174,6 +185,8 @@ impl Projection {
             let gone = known.without(passive, |k| keeps(k, u[k]));
             known.complete(gone, passive, column);
         }
+        // Whether it has begun anew, with the equations alone: rows on which a point lies may contradict each other by their rounding.
+        let mut anew = false;
         // Columns that are combinations of the passive ones.
         let mut blocked = vec![false; m];
         let mut is_passive = vec![false; m];
@@ -210,15 +223,26 @@ impl Projection {
                 residual.iter_mut().zip(column(k)).for_each(|(r, e)| *r -= u[k] * e);
             }
             if norm(&residual) < DEPENDENT {
-                return false;
+                if anew || passive.iter().all(|&k| k >= bounds) {
+                    return noise.iter().any(|noise| WITHIN * noise >= 1.0);
+                }
+                anew = true;
+                passive.retain(|&k| k >= bounds);
+                known = Span::of(passive.iter().map(|&k| column(k)));
+                u.fill(0.0);
+                blocked.fill(false);
+                continue;
             }
             let slope = |k: usize| dot(&rows[k], &residual[..n]) + h[k] * residual[n];
             passive.iter().for_each(|&k| is_passive[k] = true);
             let open = (0..bounds).filter(|&k| !blocked[k] && !is_passive[k]);
-            let steepest = open.map(|k| (k, slope(k))).max_by(|a, b| a.1.total_cmp(&b.1));
+            let least = DEPENDENT * norm(&residual);
+            let rises = |k: usize, slope: f64| slope > least + noise[k] * residual[n].abs();
+            let steep = open.map(|k| (k, slope(k))).filter(|&(k, slope)| rises(k, slope));
+            let steepest = steep.max_by(|a, b| a.1.total_cmp(&b.1));
             is_passive.fill(false);
             match steepest {
-                Some((k, slope)) if slope > DEPENDENT * norm(&residual) => {
+                Some((k, _)) => {
                     passive.push(k);
                     known.push(column(k));
                     let grown = known.least_squares(n);
@@ -229,7 +253,7 @@ impl Projection {
                         blocked[k] = true;
                     }
                 }
-                _ => {
+                None => {
                     for (y, s) in y.iter_mut().zip(nearest(passive, rows, &h, n)) {
                         *y += size * s;
                     }
