@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::numbers::{self, Scalar, by_contact, of_contacts};
-use crate::parts::{Given, Shown, put, put_bound};
+use crate::parts::{Given, Shown, put};
 use crate::{expected, mistake};
 
 /// The letters of the local form.
@@ -167,6 +167,19 @@ fn bounds(given: &mut Given<'_, '_>, rows: usize) -> PyResult<Bounds> {
         lower: given.vector_or("lower", rows, f64::NEG_INFINITY)?,
         upper: given.vector_or("upper", rows, f64::INFINITY)?,
     })
+}
+
+/// As [`put`], of n bounds, for which one number may stand.
+fn put_bound(
+    given: &mut Given<'_, '_>,
+    name: &'static str,
+    n: usize,
+    into: &mut Vec<f64>,
+) -> PyResult<()> {
+    if given.is_given(name) {
+        *into = given.vector_or(name, n, 0.0)?;
+    }
+    Ok(())
 }
 
 /// As [`put`], of a vector by contacts with D components each.

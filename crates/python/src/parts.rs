@@ -129,19 +129,6 @@ pub fn put(given: &mut Given<'_, '_>, name: &'static str, into: &mut Vec<f64>) -
     Ok(())
 }
 
-/// As [`put`], of n bounds, for which one number may stand.
-pub fn put_bound(
-    given: &mut Given<'_, '_>,
-    name: &'static str,
-    n: usize,
-    into: &mut Vec<f64>,
-) -> PyResult<()> {
-    if given.is_given(name) {
-        *into = given.vector_or(name, n, 0.0)?;
-    }
-    Ok(())
-}
-
 fn missing(name: &str) -> PyErr {
     expected(name, "this part", "nothing")
 }

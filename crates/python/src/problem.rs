@@ -14,7 +14,7 @@ use pyo3::types::{PyDict, PyList};
 use pyo3::{PyTraverseError, PyVisit};
 
 use crate::function::{self, Faults, Functions};
-use crate::parts::{Given, Shown, put, put_bound};
+use crate::parts::{Given, Shown, put};
 use crate::{contact, expected, mistake, numbers};
 
 /// A problem of any kind, with what a file says of it.
@@ -201,9 +201,8 @@ fn changed(problem: &AnyProblem, parts: &Bound<'_, PyDict>) -> PyResult<AnyProbl
         }
         AnyProblem::Complementarity(Complementarity::Mcp(p)) if p.F.expressions().is_none() => {
             let (mut given, mut other) = (Given::new(parts), p.clone());
-            let n = other.start.len();
-            put_bound(&mut given, "lower", n, &mut other.lower)?;
-            put_bound(&mut given, "upper", n, &mut other.upper)?;
+            put(&mut given, "lower", &mut other.lower)?;
+            put(&mut given, "upper", &mut other.upper)?;
             put(&mut given, "start", &mut other.start)?;
             let valid = other.validate();
             given.made(valid, &["lower", "upper", "start"])?;

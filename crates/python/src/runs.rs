@@ -56,12 +56,9 @@ impl Runs {
             let known = Cost::ALL.map(Cost::name).join(", ");
             return Err(expected("cost", &format!("one of {known}"), cost));
         };
-        let of_kind = self.0.runs.iter().filter(|run| run.kind == kind).map(|run| run.tolerance);
-        let mut there: Vec<f64> = of_kind.collect();
+        let there = self.0.tolerances_of(kind);
         if !there.contains(&tolerance) {
-            there.sort_by(f64::total_cmp);
-            there.dedup();
-            let there: Vec<_> = there.iter().map(|t| format!("{t:e}")).collect();
+            let there: Vec<_> = there.iter().rev().map(|t| format!("{t:e}")).collect();
             let what = format!("a tolerance of the runs ({})", there.join(", "));
             return Err(expected("tol", &what, format!("{tolerance:e}")));
         }
