@@ -43,6 +43,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             mu: 0.5,
             r: [wave(8); 3],
             u: [wave(9); 3],
+            mu_r: 0.0,
+            moment: [0.0; 2],
+            rolling: [0.0; 2],
             status: None,
         };
         run.frames.push(Frame {

@@ -91,12 +91,40 @@ pub fn determinant<const D: usize>(a: &[[f64; D]; D]) -> f64 {
 /// The inverse by Gauss–Jordan elimination with partial pivoting, or `None` where a pivot vanishes
 /// relative to the largest entry of the block.
 pub fn inverse<const D: usize>(a: &[[f64; D]; D]) -> Option<[[f64; D]; D]> {
+    let largest = a.iter().flatten().fold(0.0_f64, |s, v| s.max(v.abs()));
+    in_place(a, largest).or_else(|| with_exchanges(a, largest))
+}
+
+/// The inverse where no rows are to be exchanged, as of most blocks of contacts, to the same bits.
+#[inline(always)]
+fn in_place<const D: usize>(a: &[[f64; D]; D], largest: f64) -> Option<[[f64; D]; D]> {
+    let mut m = *a;
+    for k in 0..D {
+        let pivot = m[k][k];
+        let is_largest = (k + 1..D).all(|i| m[i][k].abs() < pivot.abs());
+        if !(is_largest && pivot.abs() > 1e-14 * largest && pivot.is_finite()) {
+            return None;
+        }
+        let d = 1.0 / pivot;
+        m[k][k] = 1.0;
+        m[k] = m[k].map(|x| x * d);
+        for i in (0..D).filter(|&i| i != k) {
+            let f = m[i][k];
+            m[i][k] = 0.0;
+            for j in 0..D {
+                m[i][j] -= f * m[k][j];
+            }
+        }
+    }
+    Some(m)
+}
+
+fn with_exchanges<const D: usize>(a: &[[f64; D]; D], largest: f64) -> Option<[[f64; D]; D]> {
     let mut m = *a;
     let mut inv = [[0.0; D]; D];
     for i in 0..D {
         inv[i][i] = 1.0;
     }
-    let largest = a.iter().flatten().fold(0.0_f64, |s, v| s.max(v.abs()));
     for k in 0..D {
         let p = (k + 1..D).fold(k, |p, i| if m[i][k].abs() >= m[p][k].abs() { i } else { p });
         if m[p][k].abs() <= 1e-14 * largest || !m[p][k].is_finite() {
@@ -187,6 +215,24 @@ mod tests {
                 assert!((column[j] - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
         }
+    }
+
+    #[test]
+    fn without_exchanges_the_inverse_has_the_same_bits() {
+        let (mut state, mut taken) = (1_u64, 0);
+        let mut draw = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 40) as f64 / (1 << 23) as f64 - 1.0
+        };
+        for _ in 0..200 {
+            let mut a: [[f64; 3]; 3] = std::array::from_fn(|_| std::array::from_fn(|_| draw()));
+            (0..3).for_each(|k| a[k][k] += 0.7);
+            if let Some(inverse) = in_place(&a, 2.0) {
+                assert_eq!(Some(inverse), with_exchanges(&a, 2.0));
+                taken += 1;
+            }
+        }
+        assert!((50..200).contains(&taken), "{taken}");
     }
 
     #[test]

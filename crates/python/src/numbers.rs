@@ -28,7 +28,7 @@ fn array<'py, T: Element>(
     what: &str,
 ) -> PyResult<Bound<'py, PyArrayDyn<T>>> {
     if let Ok(array) = given.cast_exact::<PyArrayDyn<T>>()
-        && array.is_c_contiguous()
+        && is_plain(array)
     {
         return Ok(array.clone());
     }
@@ -48,10 +48,13 @@ fn array<'py, T: Element>(
     if !kinds.contains(&kind) && !empty {
         return Err(expected(place, what, any.dtype().str()?));
     }
-    let made = numpy(py, "ascontiguousarray")?.call1((&any, T::get_dtype(py)))?;
-    // Scalars become arrays of one entry there; they are none.
-    let made = if any.ndim() == 0 { made.call_method1("reshape", ((),))? } else { made };
+    let made = numpy(py, "require")?.call1((&any, T::get_dtype(py), "CA"))?;
     Ok(made.cast_into::<PyArrayDyn<T>>()?)
+}
+
+/// Whether the entries lie one after the other, where the processor likes them to.
+fn is_plain<T: Element>(array: &Bound<'_, PyArrayDyn<T>>) -> bool {
+    array.is_c_contiguous() && array.data().is_aligned()
 }
 
 /// Whether something is masked: an array of numpy's `ma`, or one of the items of a list.
@@ -176,7 +179,7 @@ fn indices(place: &str, given: &Bound<'_, PyAny>) -> PyResult<Vec<usize>> {
         array.as_slice().map_err(mistake)?.iter().map(index).collect()
     }
     if let Ok(short) = given.cast::<PyArrayDyn<i32>>()
-        && short.is_c_contiguous()
+        && is_plain(short)
     {
         return whole(place, short);
     }

@@ -4,7 +4,7 @@
 //! that asks waits, sees Ctrl-C, and runs the callback of each step.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use nonsmooth_io::ProblemFile;
@@ -103,6 +103,8 @@ pub struct Simulation {
     /// None while a run has it.
     inner: Mutex<Option<nonsmooth_simulate::Simulation>>,
     scene: Arc<SceneFile>,
+    /// What all runs begin with: to write the scene down takes as long as many steps.
+    begun: OnceLock<Trajectory>,
 }
 
 fn busy() -> PyErr {
@@ -130,7 +132,7 @@ impl Simulation {
     fn new(py: Python<'_>, scene: &str, settle: bool) -> PyResult<Self> {
         let scene = Arc::new(SceneFile::parse(scene, &[]).map_err(mistake)?);
         let inner = Mutex::new(Some(built(py, &scene, settle)?));
-        Ok(Self { inner, scene })
+        Ok(Self { inner, scene, begun: OnceLock::new() })
     }
 
     /// The time, s.
@@ -196,7 +198,9 @@ impl Simulation {
             cancel: Some(watcher.stop.clone()),
             ..Default::default()
         };
-        let (scene, told) = (self.scene.clone(), callback.is_some());
+        let told = callback.is_some();
+        let begun = || nonsmooth_record::begun(&self.scene, &simulation);
+        let mut trajectory = self.begun.get_or_init(begun).clone();
         let hear = |news: Option<(Stepped, Frame)>| {
             ask(&watcher, |py| match (&callback, news) {
                 (Some(callback), Some((step, frame))) => {
@@ -209,7 +213,6 @@ impl Simulation {
         let (simulation, trajectory, report) = py.detach(|| {
             elsewhere(hear, move |say| {
                 let mut simulation = simulation.with_limits(limits);
-                let mut trajectory = nonsmooth_record::begun(&scene, &simulation);
                 trajectory.frames.push(nonsmooth_record::frame(&simulation));
                 let mut watch =
                     |simulation: &nonsmooth_simulate::Simulation,
@@ -522,6 +525,12 @@ impl Run {
         all.set_item("r", triple(|c| c.r)?)?;
         all.set_item("u", triple(|c| c.u)?)?;
         all.set_item("impulse", triple(Contact::world_impulse)?)?;
+        let double = |of: fn(&Contact) -> [f64; 2]| {
+            PyArray1::from_iter(py, contacts.iter().flat_map(of)).reshape([contacts.len(), 2])
+        };
+        all.set_item("mu_r", column(|c| c.mu_r))?;
+        all.set_item("rolling", double(|c| c.rolling)?)?;
+        all.set_item("moment", triple(Contact::world_moment)?)?;
         Ok(all)
     }
 

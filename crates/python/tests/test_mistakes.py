@@ -316,6 +316,25 @@ def test_arguments_are_named(call, said):
         call()
 
 
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        ({"position": np.ma.array([0, 0, 1.0], mask=[0, 1, 0])}, "position: expected numbers, found a masked array"),
+        ({"position": [0, np.ma.masked, 1]}, r"position\[1\]: expected numbers, found a masked number"),
+        ({"position": [0, None, 1]}, r"position\[1\]: expected numbers .*found None"),
+        ({"position": np.array([0, None, 1])}, "position: expected an array of numbers, found one of object"),
+        ({"motion": {"amplitude": None}}, "amplitude|motion"),
+        ({"groups": (word for word in "ab")}, "groups: expected numbers, words and lists, found generator"),
+        ({"groups": {"a"}}, "groups: expected numbers, words and lists, found set"),
+    ],
+)
+def test_what_a_table_holds_is_looked_at_where_it_is_given(table, said):
+    with pytest.raises(ns.Error, match=said):
+        world = ns.World()
+        world.sphere(0.1, density=1.0, **table)
+        ns.Simulation(world)
+
+
 def test_whole_numbers_may_be_written_as_floats():
     assert ns.solve(ONE, max_iter=1e3, threads=np.int64(1)).solved
     assert ns.solve(ONE, max_iter=10**30, time_limit=np.float32(5.0)).solved

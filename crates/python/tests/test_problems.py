@@ -113,7 +113,9 @@ def test_layouts_are_taken():
     q = -np.ones(8)[::2]
     readonly = m.copy()
     readonly.flags.writeable = False
-    for matrix in (m, big[::2, ::2], readonly, m.tolist()):
+    astray = np.frombuffer(b"\0" + m.tobytes(), dtype=float, offset=1).reshape(m.shape)
+    assert not astray.flags.aligned
+    for matrix in (m, big[::2, ::2], readonly, m.tolist(), astray):
         np.testing.assert_array_equal(ns.LCP(matrix, q).M, m)
 
 

@@ -51,6 +51,23 @@ def test_a_sliding_ball_comes_to_roll_and_a_run_goes_on():
     assert simulation.problem().contacts == 1
 
 
+def test_moments_of_rolling_friction_balance_the_spin_of_a_ball():
+    world = ns.World()
+    world.plane()
+    world.pair("default", mu=0.3, mu_rolling=1e-3)
+    world.sphere(0.1, mass=2.0, position=[0, 0, 0.1], velocity=[1, 0, 0], name="ball")
+    simulation = ns.Simulation(world, h=1e-3)
+    simulation.run(0.5)
+    before = simulation.angular_velocity[1].copy()
+    run = simulation.run(simulation.t + 1e-3)
+    contact = run.contacts()[0]
+    assert contact["mu_r"] == 1e-3 and contact["rolling"][0] != 0.0
+    lever = contact["point"] - run.position[0, 1]
+    spin = 0.4 * 2.0 * 0.1**2 * (simulation.angular_velocity[1] - before)
+    np.testing.assert_allclose(spin, np.cross(lever, contact["impulse"]) + contact["moment"], atol=1e-9)
+    assert np.abs(contact["moment"]).max() > 1e-6
+
+
 def test_callbacks_see_and_end():
     simulation, seen = ns.Simulation(ball(), h=1e-3), []
 

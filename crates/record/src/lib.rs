@@ -134,6 +134,9 @@ fn contact(c: &ContactReport) -> Contact {
         mu: c.mu,
         r: c.impulse,
         u: c.after,
+        mu_r: c.mu_r,
+        moment: c.moment,
+        rolling: c.rolling,
         status: c.motion(),
     }
 }

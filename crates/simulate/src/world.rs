@@ -56,6 +56,19 @@ pub enum Motion {
     },
 }
 
+impl Motion {
+    /// The velocity at a time of a body that impulses do not move, shapes and all.
+    pub(crate) fn velocity(&self, t: f64) -> Vec3 {
+        match *self {
+            Self::Uniform { velocity } => velocity,
+            Self::Oscillating { amplitude, frequency, phase } => {
+                oscillation(amplitude, frequency, phase, t).1
+            }
+            Self::Free | Self::Fixed | Self::Surface { .. } => [0.0; 3],
+        }
+    }
+}
+
 /// A rigid body with any number of shapes. Velocities are in the world frame; the origin of its frame is its mass centre.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {

@@ -60,6 +60,10 @@ pub const MAKERS: &[Maker] = &[
             let mut s = s.clone();
             let class = s.entry("class").or_insert(INFEASIBLE[0].into()).clone();
             let planted = planted(&s)?;
+            let least = PlantedLcp::LEAST_INFEASIBLE;
+            if planted.n < least {
+                return Err(format!("n: expected at least {least}, found {}", planted.n));
+            }
             let (problem, _) = planted.infeasible().ok_or_else(|| {
                 format!("class: expected psd, kkt or copositive_plus, as others have solutions, found {class}")
             })?;
@@ -72,7 +76,7 @@ pub const MAKERS: &[Maker] = &[
         settings: described::<Of<PlantedMlcp>>,
         make: |s| {
             let made = recipe::<PlantedMlcp>(s)?;
-            fits(made.free + made.pairs, made.density)?;
+            fits(made.free + made.pairs + made.redundant, made.density)?;
             Ok(solved(made.mlcp()))
         },
     },

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use nonsmooth_io::trajectory::Trajectory;
+use nonsmooth_record::Origin;
 use nonsmooth_scenes::{SceneEntry, SceneError};
 use nonsmooth_simulate::{Control, RunReport, SceneFile, SimulateError, Simulation, StepReport};
 use nonsmooth_solve::settings;
@@ -149,6 +150,13 @@ fn scene(args: &Args) -> Result<Option<SceneFile>, String> {
             return Err(format!("{name}: expected a file or a family of scenes, and {e}"));
         }
         _ => {
+            if let Some(origin) = path.exists().then(|| Origin::of(path)).flatten() {
+                return Err(format!(
+                    "{name}: expected a scene as TOML or JSON, found {}, of which `nonsmooth convert {name} {}` makes one",
+                    origin.name(),
+                    path.with_extension("toml").display()
+                ));
+            }
             let text = SceneFile::text(path)?;
             // --end stands in for an end that the scene does not state; its value comes below.
             changes.extend(args.end.map(|_| "time.end=0"));

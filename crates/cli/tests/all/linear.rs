@@ -149,6 +149,8 @@ fn problems_are_generated_with_the_solution_planted() {
         ("gen lcp --set class=q --out a.toml", ["class", "spd"]),
         ("gen lcp --set n=1000000 --out a.toml", ["fits in memory", "1000000 × 1000000"]),
         ("gen mlcp --set pairs=1000000 --out a.toml", ["fits in memory", "GB"]),
+        ("gen mlcp --set redundant=20000000 --out a.toml", ["fits in memory", "GB"]),
+        ("gen infeasible --set n=3 --out a.toml", ["at least 6", "found 3"]),
         ("gen infeasible --set class=spd --out a.toml", ["class", "psd, kkt or copositive_plus"]),
         ("gen magic --out a.toml", ["magic", "complementarity: lcp"]),
     ] {

@@ -308,8 +308,16 @@ fn mistakes_are_one_line() {
     let folder = folder();
     std::fs::write(folder.path("broken.toml"), "bodies = [").unwrap();
     std::fs::write(folder.path("bytes.h5"), b"\x89HDF\r\n").unwrap();
+    std::fs::write(folder.path("robot.urdf"), "<robot/>").unwrap();
+    std::fs::write(folder.path("robot.xml"), "<mujoco/>").unwrap();
     for (command, says) in [
         ("simulate", "SCENE"),
+        (
+            "simulate robot.urdf",
+            "robot.urdf: expected a scene as TOML or JSON, found URDF, of which `nonsmooth convert robot.urdf robot.toml` makes one",
+        ),
+        ("simulate robot.xml", "found MJCF, of which `nonsmooth convert robot.xml robot.toml`"),
+        ("simulate no.xml", "no.xml: expected a readable file"),
         ("simulate nowhere.toml", "nowhere.toml: expected a readable file"),
         ("simulate wal", "wal: expected a file or a family of scenes"),
         ("simulate broken.toml", "broken.toml: line 1: expected valid TOML"),

@@ -9,6 +9,7 @@
 //! /contacts/                   offset (n + 1): those of frame k are offset[k] .. offset[k + 1]
 //!                              key (c, 4), a, b (c), point (c, 3), frame (c, 3, 3), gap, mu (c)
 //!                              offset_a (c, 3), from a to the image of it that touches, where one does;
+//!                              mu_r (c), moment (c, 3), moment_local, rolling (c, 2), where there is rolling friction;
 //!                              r, r_local, u (c, 3), status (c): 0 took no part, 1 open, 2 stick, 3 slip
 //! /joints/                     name (j); angle, slide, violation (n, j), impulse, moment (n, j, 3)
 //! /steps/                      number, time, h, status, residual, iterations, newton, near, active, open, stick, slip,
@@ -142,6 +143,12 @@ pub struct Contact {
     pub r: [f64; 3],
     /// The relative velocity after the step as `[N, T1, T2]`, m/s.
     pub u: [f64; 3],
+    /// The coefficient of rolling friction, m; zero without it, and then what follows is too.
+    pub mu_r: f64,
+    /// The moment on b about `[T1, T2]`, N·m·s.
+    pub moment: [f64; 2],
+    /// The angular velocity of b seen from a after the step about `[T1, T2]`, rad/s.
+    pub rolling: [f64; 2],
     /// What it does; `None`: it took no part in the step.
     pub status: Option<Motion>,
 }
@@ -150,6 +157,11 @@ impl Contact {
     /// The impulse on b in the frame of the world, N·s.
     pub fn world_impulse(&self) -> [f64; 3] {
         self.in_world(self.r)
+    }
+
+    /// The moment of rolling friction on b in the frame of the world, N·m·s.
+    pub fn world_moment(&self) -> [f64; 3] {
+        self.in_world([0.0, self.moment[0], self.moment[1]])
     }
 
     /// The relative velocity after the step in the frame of the world, m/s.

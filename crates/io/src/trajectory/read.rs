@@ -140,6 +140,13 @@ fn fill(root: &Folder, run: &mut Trajectory) -> Result<(), IoError> {
         true => vectors("offset_a")?,
         false => vec![[0.0; 3]; c],
     };
+    let rolls = g.has("mu_r")?;
+    let mu_r = if rolls { g.table("mu_r", &[c])? } else { vec![0.0; c] };
+    let pairs = |name| match rolls {
+        true => g.vectors::<2>(name, &[c, 2]),
+        false => Ok(vec![[0.0; 2]; c]),
+    };
+    let (moment, rolling) = (pairs("moment_local")?, pairs("rolling")?);
     let axes = g.vectors::<3>("frame", &[c, 3, 3])?;
     let (gap, mu) = (g.table("gap", &[c])?, g.table("mu", &[c])?);
     let status = g.naturals("status", Some(STATUSES.len()))?;
@@ -158,6 +165,9 @@ fn fill(root: &Folder, run: &mut Trajectory) -> Result<(), IoError> {
         mu: mu[k],
         r: r[k],
         u: u[k],
+        mu_r: mu_r[k],
+        moment: moment[k],
+        rolling: rolling[k],
         status: STATUSES[status[k] as usize],
     };
     for (frame, w) in run.frames.iter_mut().zip(offset.windows(2)) {

@@ -220,6 +220,12 @@ fn contacts(g: &mut Out, run: &View) {
     if all().any(|t| t.offset != [0.0; 3]) {
         g.table("offset_a", &[c, 3], all().flat_map(|t| t.offset));
     }
+    if all().any(|t| t.mu_r != 0.0) {
+        g.table("mu_r", &[c], all().map(|t| t.mu_r));
+        g.table("moment", &[c, 3], all().flat_map(Contact::world_moment));
+        g.table("moment_local", &[c, 2], all().flat_map(|t| t.moment));
+        g.table("rolling", &[c, 2], all().flat_map(|t| t.rolling));
+    }
     g.table("frame", &[c, 3, 3], all().flat_map(|t| t.frame.into_iter().flatten()));
     g.table("gap", &[c], all().map(|t| t.gap));
     g.table("mu", &[c], all().map(|t| t.mu));

@@ -27,6 +27,9 @@ pub fn run(frames: usize) -> Trajectory {
             mu: 0.3,
             r: [2.0, -0.5, 0.25],
             u: [0.0, 0.125, 0.0],
+            mu_r: if c % 2 == 1 { 0.01 } else { 0.0 },
+            moment: if c % 2 == 1 { [1e-3, -t] } else { [0.0; 2] },
+            rolling: if c % 2 == 1 { [0.0, t] } else { [0.0; 2] },
             status: [None, Some(Motion::Open), Some(Motion::Stick), Some(Motion::Slip)][c % 4],
         };
         let bounce = (6.0 * t).sin().abs();

@@ -368,7 +368,7 @@ class Extragradient(Settings):
     grow_below : float, default 0.3
         Lengthen the next step after a ratio below this, in (0, accept).
     shrink : float, default 0.67
-        The factor by which a step is shortened, in (0, 1); its inverse lengthens.
+        The factor by which a step is shortened, in (0, 0.99); its inverse lengthens.
     check_every : int, default 20
         Steps between two evaluations of the true residual, unless the estimate asks for one
         earlier.
@@ -455,7 +455,7 @@ class FixedPoint(Settings):
     grow_below : float, default 0.3
         Lengthen the next step after a ratio below this, in (0, accept).
     shrink : float, default 0.67
-        The factor by which a step is shortened, in (0, 1); its inverse lengthens.
+        The factor by which a step is shortened, in (0, 0.99); its inverse lengthens.
     check_every : int, default 20
         Steps between two evaluations of the true residual, unless the estimate asks for one
         earlier.
@@ -506,7 +506,7 @@ class Hyperplane(Settings):
     grow_below : float, default 0.3
         Lengthen the next prediction after a ratio below this, in (0, accept).
     shrink : float, default 0.67
-        The factor by which a prediction's step is shortened, in (0, 1); its inverse lengthens.
+        The factor by which a prediction's step is shortened, in (0, 0.99); its inverse lengthens.
     check_every : int, default 20
         Steps between two evaluations of the true residual, unless the estimate asks for one
         earlier.

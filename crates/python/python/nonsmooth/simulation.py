@@ -44,11 +44,30 @@ def _own(table: Mapping[str, object]) -> dict[str, Any]:
     for key, value in table.items():
         if isinstance(value, Mapping):
             own[key] = _own(value)
-        elif isinstance(value, (list, tuple)) and any(one is None for one in value):
-            raise _nonsmooth.Error(f"{key}: expected numbers (infinite ones where there is no limit), found None")
         elif value is not None:
+            _check(value, key)
             own[key] = copy.deepcopy(value)
     return own
+
+
+def _check(value: object, place: str) -> None:
+    """Refuses, by its place, what is no number, word or list of them."""
+    if isinstance(value, (list, tuple)):
+        for k, one in enumerate(value):
+            _check(one, f"{place}[{k}]")
+    elif isinstance(value, Mapping):
+        for key, one in value.items():
+            _check(one, f"{place}.{key}")
+    elif value is None:
+        raise _nonsmooth.Error(f"{place}: expected numbers (infinite ones where there is no limit), found None")
+    elif isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        found = "a masked array (filled() says what stands for what is masked)" if value.ndim else "a masked number"
+        raise _nonsmooth.Error(f"{place}: expected numbers, found {found}")
+    elif isinstance(value, (np.ndarray, np.generic)):
+        if value.dtype.kind not in "biufU":
+            raise _nonsmooth.Error(f"{place}: expected an array of numbers, found one of {value.dtype}")
+    elif not isinstance(value, (bool, int, float, str)):
+        raise _nonsmooth.Error(f"{place}: expected numbers, words and lists, found {type(value).__name__}")
 
 
 def _infinite(value: object, place: str) -> Iterator[tuple[str, float]]:
@@ -496,7 +515,7 @@ class Run:
         return self._native.joint(name)
 
     def contacts(self, frame: int = -1) -> Table:
-        """The contacts of a frame: bodies a and b, status, gap, mu, point, normal, r and u as [N, T1, T2], and the impulse on b in the frame of the world."""
+        """The contacts of a frame: bodies a and b, status, gap, mu, point, normal, r and u as [N, T1, T2], and the impulse on b in the frame of the world; of rolling friction mu_r, the relative angular velocity rolling about [T1, T2] (rad/s), and the moment on b in the frame of the world (N m s)."""
         columns = self._native.contacts(range(len(self.t))[frame])
         kinds = [
             (name, np.asarray(column).dtype, np.asarray(column).shape[1:])

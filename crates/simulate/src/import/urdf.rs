@@ -4,8 +4,8 @@
 
 use std::collections::BTreeMap;
 
-use nonsmooth_scenes::MassProperties;
 use nonsmooth_scenes::vec3::{Mat3, Vec3, apply, congruence, sub};
+use nonsmooth_scenes::{MassProperties, Rotation};
 use roxmltree::{Document, Node};
 use serde_json::{Value, json};
 
@@ -168,11 +168,38 @@ impl<'a> Robot<'a> {
             joints.push(table);
         }
         for joint in self.joints {
+            let key = format!("joint `{}`", joint.name);
             let limit = element(joint.node, "limit");
             if limit.is_some_and(|l| l.has_attribute("effort") || l.has_attribute("velocity")) {
                 self.warnings.push(format!(
-                    "joint `{}`: effort and velocity of its limit are of a motor, which URDF does not have: left out",
-                    joint.name
+                    "{key}: effort and velocity of its limit are of a motor, which URDF does not have: left out"
+                ));
+            }
+            if matches!(joint.kind, "revolute" | "continuous" | "prismatic" | "fixed") {
+                continue;
+            }
+            for (tag, names) in
+                [("limit", ["lower", "upper"]), ("dynamics", ["damping", "friction"])]
+            {
+                let Some(node) = element(joint.node, tag) else { continue };
+                let [a, b] = names.map(|name| real(node, name, &key));
+                if [a?, b?].into_iter().flatten().any(|x| x != 0.0) {
+                    let [a, b] = names;
+                    self.warnings
+                        .push(format!("{key}: {a} and {b} of a {} joint are left out", joint.kind));
+                }
+            }
+        }
+        let links = self.links.iter().map(|l| ("link", l.name, l.node));
+        for (tag, name, node) in links.chain(self.joints.iter().map(|j| ("joint", j.name, j.node)))
+        {
+            let turned = |n: &Node| {
+                let seen = n.parent().is_some_and(|p| p.has_tag_name("visual"));
+                n.has_tag_name("origin") && n.has_attribute("quat_xyzw") && !seen
+            };
+            if !knows_quaternions(node) && node.descendants().any(|n| turned(&n)) {
+                self.warnings.push(format!(
+                    "{tag} `{name}`: `quat_xyzw` is left out, for it means something only in a <robot> of version 1.1"
                 ));
             }
         }
@@ -205,11 +232,11 @@ impl<'a> Robot<'a> {
         }
     }
 
-    /// A body of links that do not move against each other, in the axes of the first; none of a root with neither mass nor shape.
+    /// A body of links that do not move against each other, in the axes of the first. What is fixed to a root called `world` stands, as do roots without any mass: no body where there is no shape either.
     fn body(&mut self, root: usize, members: &[usize]) -> Result<Option<Value>, SimulateError> {
         let frame = self.frame(root);
         let inner = |link: usize| frame.back().then(&self.frame(link));
-        let (mut masses, mut shapes) = (vec![], vec![]);
+        let (mut masses, mut heavy, mut shapes) = (vec![], vec![], vec![]);
         for &k in members {
             let (link, place) = (&self.links[k], inner(k));
             let key = format!("link `{}`", link.name);
@@ -217,6 +244,7 @@ impl<'a> Robot<'a> {
                 && let Some(own) = inertial(node, &key)?
             {
                 masses.push(place.mass(&own));
+                heavy.push(k);
             }
             for node in elements(link.node, "collision") {
                 let at = place.then(&origin(node, &key)?);
@@ -226,27 +254,33 @@ impl<'a> Robot<'a> {
         let name = self.links[root].name;
         let moved = self.links[root].parent.map(|j| &self.joints[j]);
         let mut body = json!({"name": self.called(root)});
-        let centre = match masses.is_empty() {
-            false => {
+        let weightless = moved.is_none() && !heavy.contains(&root);
+        let stands = weightless && (heavy.is_empty() || name == "world");
+        if weightless && !stands {
+            self.warnings.push(format!(
+                "link `{name}`: a root without mass moves with what is fixed to it, as `{}`; one called `world` would stand",
+                self.links[heavy[0]].name
+            ));
+        }
+        let centre = match moved {
+            None if stands => {
+                if shapes.is_empty() {
+                    return Ok(None);
+                }
+                body["fixed"] = json!(true);
+                [0.0; 3]
+            }
+            Some(joint) if masses.is_empty() => {
+                let expected =
+                    format!("a mass, for joint `{}` of type {} moves it", joint.name, joint.kind);
+                return Err(SimulateError::value(format!("link `{name}`"), expected, "none"));
+            }
+            _ => {
                 let MassProperties { mass, centre, inertia } = MassProperties::joined(&masses);
                 body["mass"] = json!(mass);
                 body["inertia"] = json!(entries(&inertia));
                 centre
             }
-            true => match moved {
-                Some(joint) => {
-                    let expected = format!(
-                        "a mass, for joint `{}` of type {} moves it",
-                        joint.name, joint.kind
-                    );
-                    return Err(SimulateError::value(format!("link `{name}`"), expected, "none"));
-                }
-                None if shapes.is_empty() => return Ok(None),
-                None => {
-                    body["fixed"] = json!(true);
-                    [0.0; 3]
-                }
-            },
         };
         body["position"] = json!(frame.point(centre));
         body["rotation"] = json!({"quaternion": frame.q.0});
@@ -290,6 +324,10 @@ impl<'a> Robot<'a> {
             None => Ok(None),
         };
         if let "revolute" | "prismatic" = joint.kind {
+            if element(joint.node, "limit").is_none() {
+                let expected = format!("<limit>, which a {} joint has", joint.kind);
+                return Err(SimulateError::value(key, expected, "none"));
+            }
             let [lower, upper] =
                 [number("limit", "lower")?, number("limit", "upper")?].map(|x| x.unwrap_or(0.0));
             table["limits"] = json!({"lower": lower, "upper": upper});
@@ -376,12 +414,32 @@ fn needed(node: Node, name: &str, key: &str) -> Result<f64, SimulateError> {
     })
 }
 
-/// `xyz` and `rpy`: turned about the fixed axes x, y, z in this order.
+/// Whether quaternions have a meaning in the document: from version 1.1 on.
+fn knows_quaternions(node: Node) -> bool {
+    let version = node.document().root_element().attribute("version");
+    version.and_then(|v| v.parse().ok()).is_some_and(|v: f64| v >= 1.1)
+}
+
+/// `xyz` with `rpy`, turned about the fixed axes x, y, z in this order, or with `quat_xyzw`.
 fn origin<'a>(node: Node<'a, 'a>, key: &str) -> Result<Frame, SimulateError> {
     let Some(node) = element(node, "origin") else { return Ok(Frame::HERE) };
     let x = triple(node, "xyz", key)?.unwrap_or_default();
-    let [r, p, y] = triple(node, "rpy", key)?.unwrap_or_default();
-    Ok(Frame { x, q: unit(about(2, y).after(about(1, p)).after(about(0, r))) })
+    let rpy = triple(node, "rpy", key)?;
+    let quaternion = some::<4>(node, "quat_xyzw", key)?.filter(|_| knows_quaternions(node));
+    let q = match (rpy, quaternion) {
+        (Some(_), Some(_)) => {
+            return Err(SimulateError::value(key, "either `rpy` or `quat_xyzw`", "both"));
+        }
+        (None, Some([0.0, 0.0, 0.0, 0.0])) => {
+            return Err(SimulateError::value(key, "a quaternion as `quat_xyzw`", "zero"));
+        }
+        (None, Some([x, y, z, w])) => Rotation([w, x, y, z]),
+        (rpy, None) => {
+            let [r, p, y] = rpy.unwrap_or_default();
+            about(2, y).after(about(1, p)).after(about(0, r))
+        }
+    };
+    Ok(Frame { x, q: unit(q) })
 }
 
 /// Mass and inertia of a link in its frame; none without mass.

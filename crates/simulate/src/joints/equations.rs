@@ -47,6 +47,8 @@ pub(crate) struct Linkage {
     pub kind: JointKind,
     pub a: Option<u32>,
     pub b: u32,
+    /// Whether it is reported on a.
+    pub on_a: bool,
     in_a: Pose,
     in_b: Pose,
     length: f64,
@@ -90,6 +92,7 @@ impl Linkage {
             kind: joint.kind,
             a: a.map(|a| a as u32),
             b: joint.b.0,
+            on_a: joint.on_a,
             in_a: local(a, joint.anchors[0]),
             in_b: local(Some(joint.b.index()), joint.anchors[1]),
             length: norm(sub(joint.anchors[1], joint.anchors[0])),
@@ -216,9 +219,9 @@ impl Linkage {
 }
 
 impl Placed {
-    /// The anchor of b.
-    pub fn anchor(&self) -> Vec3 {
-        self.p[1]
+    /// The anchor of b, or that of a.
+    pub fn anchor(&self, on_a: bool) -> Vec3 {
+        self.p[usize::from(!on_a)]
     }
 }
 

@@ -229,6 +229,8 @@ pub struct Joint {
     pub reference: Option<Vec3>,
     /// Whether the two bodies may touch each other.
     pub collide: bool,
+    /// Whether impulse and moment are told on a, or the world, and about the anchor there, in place of b.
+    pub on_a: bool,
     /// What acts along its coordinates.
     pub drives: Vec<Drive>,
 }
@@ -245,6 +247,7 @@ impl Joint {
             axis: [0.0, 0.0, 1.0],
             reference: None,
             collide: false,
+            on_a: false,
             drives: vec![],
         }
     }
@@ -491,9 +494,10 @@ pub struct JointReport {
     pub angle: f64,
     /// By which b has moved along the axis, m.
     pub slide: f64,
-    /// The impulse of the joint on b, all its rows together, in the world frame, N·s. Where equations are redundant it is one of many.
+    /// The impulse of the joint on b, all its rows together, in the world frame, N·s. Where equations are redundant it is one of many. That of the step itself:
+    /// what the projection of velocities adds at its end is not in it, O(h²), so that over h it is the load to first order.
     pub impulse: Vec3,
-    /// Its moment on b about the anchor, N·m·s.
+    /// Its moment on b about the anchor there, N·m·s.
     pub moment: Vec3,
     /// The most by which an equation is violated after the step, m or rad.
     pub violation: f64,

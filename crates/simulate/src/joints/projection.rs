@@ -16,13 +16,16 @@ use nonsmooth_scenes::vec3::{Vec3, add, apply, dot, norm, scale};
 
 use super::equations::Equation;
 use super::rows::Joints;
-use crate::World;
 use crate::rotation::{apply_transposed, cayley, inverse, unit};
 use crate::state::State;
+use crate::{BodyId, MoreauJean, Motion, Stabilisation, World};
 
-/// Violations below this share of the size of a joint are rounding.
+/// Violations below this share of the size of a joint are rounding, and rates below this share of the largest terms.
 const ROUNDING: f64 = 1e-14;
 const ITERATIONS: usize = 8;
+
+/// A rate beyond this share of its terms is more than rounding.
+const FITS: f64 = 1e-9;
 
 /// Of a body and a row: force, moment, and what these make of the body.
 type Effect = (u32, usize, Vec3, Vec3, Vec3, Vec3);
@@ -51,6 +54,22 @@ fn summed(effects: &[Effect], kappa: &[f64]) -> (Vec3, Vec3) {
     let zero = ([0.0; 3], [0.0; 3]);
     effects.iter().fold(zero, |(slide, turn), (_, row, _, _, s, t)| {
         (add(slide, scale(kappa[*row], *s)), add(turn, scale(kappa[*row], *t)))
+    })
+}
+
+/// By how much the rate of an equation is off, and the sizes of its terms together.
+fn rate(world: &World, state: &State, equation: &Equation) -> (f64, f64) {
+    let start = (-equation.target, equation.target.abs());
+    equation.gradient.iter().fold(start, |(rate, terms), r| {
+        let motion = &world.bodies[r.body as usize].motion;
+        let (v, omega) = match motion {
+            Motion::Free => {
+                (state.velocity[r.body as usize], state.angular_velocity(BodyId(r.body)))
+            }
+            _ => (motion.velocity(state.t), [0.0; 3]),
+        };
+        let (slide, turn) = (dot(r.force, v), dot(r.moment, omega));
+        (rate + slide + turn, terms + norm(r.force) * norm(v) + norm(r.moment) * norm(omega))
     })
 }
 
@@ -112,6 +131,26 @@ impl Joints {
         change
     }
 
+    /// Finds velocities that fit the joints, where those at the beginning of a step do not: before the first step, or because they were set.
+    pub fn fit(&mut self, scheme: &MoreauJean, world: &World, state: &State) {
+        self.fitted = None;
+        // Velocities that are not projected drift; to make them fit again and again would bring energy or take it.
+        let drifts = scheme.stabilisation == Stabilisation::None && state.steps > 0;
+        if self.is_empty() || drifts {
+            return;
+        }
+        let equations = self.equations(world, state, |k| state.pose(k as usize));
+        let rates: Vec<_> = equations.iter().map(|(_, e)| rate(world, state, e)).collect();
+        let largest = rates.iter().fold(0.0_f64, |most, r| most.max(r.1));
+        let fits =
+            |(rate, terms): (f64, f64)| rate.abs() <= f64::max(FITS * terms, ROUNDING * largest);
+        if !rates.into_iter().all(fits) {
+            let mut fitted = state.clone();
+            self.project_velocities(world, &mut fitted);
+            self.fitted = Some(fitted);
+        }
+    }
+
     /// How many of how many equations follow from the others, where any do and they are few enough to tell.
     pub fn redundant(&self, world: &World, state: &State) -> Option<(usize, usize)> {
         const MANY: usize = 20_000;
@@ -153,18 +192,7 @@ impl Joints {
             }
         }
         let matrix = Csc::from_triplets(p, p, entries.into_iter()).ok()?;
-        let rate = |(_, equation): &(usize, Equation)| {
-            let each = equation.gradient.iter().map(|r| {
-                let omega = apply(
-                    &Rotation(state.rotation[r.body as usize]).matrix(),
-                    state.spin[r.body as usize],
-                );
-                let turn = if is_free(r.body) { dot(r.moment, omega) } else { 0.0 };
-                dot(r.force, state.velocity[r.body as usize]) + turn
-            });
-            each.sum::<f64>() - equation.target
-        };
-        let rates = equations.iter().map(rate).collect();
+        let rates = equations.iter().map(|(_, e)| rate(world, state, e).0).collect();
         Some(System { matrix, phi: equations.iter().map(|e| e.1.value).collect(), rates, levers })
     }
 

@@ -7,7 +7,8 @@
 //! spring k, damper d:            κ = 1/(h (d + h θ k)),   b = k (s_k − rest)/(d + h θ k):    λ = −h (k (s_k + h θ s'_θ − rest) + d s'_θ)
 //! ```
 //!
-//! A row on the mean velocity would throw back a velocity that does not fit the joint: where that at the beginning does not, the row is on v⁺.
+//! A row on the mean velocity would throw back a velocity that does not fit the joints: where that at the beginning does not, the nearest one that does, in the
+//! norm of the masses, stands for it in `v_θ`, and where nothing is projected after the step in the extrapolation.
 
 use nonsmooth_scenes::vec3::{Vec3, apply, cross, dot, norm, scale, sub};
 
@@ -18,7 +19,7 @@ use crate::restitution::{Restitution, Rule};
 use crate::rotation::Pose;
 use crate::state::State;
 use crate::world::{entry, oscillation};
-use crate::{Activation, MoreauJean, Motion, World};
+use crate::{Activation, BodyId, MoreauJean, Motion, World};
 
 /// What a row does to a free body, and the rates that its velocities make.
 #[derive(Debug, Clone, Copy)]
@@ -70,12 +71,11 @@ pub(crate) struct Joints {
     /// Angle and slide at the beginning of the step.
     coordinates: Vec<[f64; 2]>,
     pub reports: Vec<JointReport>,
+    /// The state with velocities that fit, where those at the beginning of the step do not.
+    pub fitted: Option<State>,
     /// How many of how many equations follow from the others at the beginning.
     pub redundant: Option<(usize, usize)>,
 }
-
-/// A velocity that is off by more than this share of those that make it does not fit the joint.
-const UNFIT: f64 = 0.05;
 
 /// The number of a row that acts along a coordinate, after those of the equations.
 fn number(drive: usize, what: u32) -> u32 {
@@ -107,6 +107,7 @@ impl Joints {
             levers: vec![],
             coordinates: vec![],
             reports: vec![],
+            fitted: None,
             redundant: None,
         }
     }
@@ -143,8 +144,8 @@ impl Joints {
             return;
         }
         self.coordinates = self.coordinates(state, |k| bodies[k as usize].start);
-        let Self { linkages, rows, levers, coordinates, .. } = self;
-        let step = Step { scheme, world, state, bodies, h };
+        let Self { linkages, rows, levers, coordinates, fitted, .. } = self;
+        let step = Step { scheme, world, state, fitted: fitted.as_ref(), bodies, h };
         let middle = |k: u32| bodies[k as usize].middle;
         let mut gradients = Gradients::at(world, linkages, coordinates, middle);
         let mut push = |key: (u32, u32), reach: &[Reach], wanted: Wanted| {
@@ -256,6 +257,17 @@ impl Joints {
         }
     }
 
+    /// The velocity of a row without impulses, and the sizes of its terms together.
+    pub fn free(&self, row: usize, bodies: &[Moving]) -> (f64, f64) {
+        let ScalarRow { shift, given, share, .. } = self.rows[row];
+        self.levers(row).iter().fold((shift, given.abs()), |(free, terms), lever| {
+            let b = &bodies[lever.body as usize];
+            let before = share.abs() * lever.terms(b.v, b.spin);
+            let rate = lever.rate(b.v_free, b.spin_free);
+            (free + rate, terms + before + lever.terms(b.v_free, b.spin_free))
+        })
+    }
+
     /// Takes the gradients of these rows at other poses: those of the middle of the step as the last pass has it, `½ (R_k + R⁺)` for rotations. With the velocities
     /// that belong to them the equations of joints keep their values to rounding.
     pub fn place_at(&mut self, world: &World, rows: &[u32], pose: impl Fn(u32) -> Pose) {
@@ -275,12 +287,12 @@ impl Joints {
     /// Says where the joints are, and by how much they are violated at most.
     pub fn tell(&mut self, world: &World, state: &mut State) -> f64 {
         let violations = self.violations(world, state).0;
-        self.finish(state, &violations);
+        self.finish(world, state, &violations);
         violations.into_iter().fold(0.0, f64::max)
     }
 
     /// Keeps what the step did, and says it: coordinates, impulses. `violations` are those of the joints after the step.
-    pub fn finish(&mut self, state: &mut State, violations: &[f64]) {
+    pub fn finish(&mut self, world: &World, state: &mut State, violations: &[f64]) {
         if self.is_empty() {
             return;
         }
@@ -293,19 +305,24 @@ impl Joints {
         self.reports.clear();
         for (j, linkage) in self.linkages.iter().enumerate() {
             let (mut impulse, mut moment) = ([0.0; 3], [0.0; 3]);
+            // A body that impulses do not move has no levers: what acts on it is minus what acts on the other.
+            let on_b = world.bodies[linkage.b as usize].is_free();
+            let body = linkage.a.filter(|_| !on_b).unwrap_or(linkage.b);
+            let sign = if on_b == linkage.on_a { -1.0 } else { 1.0 };
             // Rows are in the order of their joints.
             let first = self.rows.partition_point(|r| (r.key.0 as usize) < j);
             let own = self.rows.iter().enumerate().skip(first);
             for (k, row) in own.take_while(|r| r.1.key.0 as usize == j) {
-                for lever in self.levers(k).iter().filter(|l| l.body == linkage.b) {
+                let lambda = sign * row.lambda;
+                for lever in self.levers(k).iter().filter(|l| l.body == body) {
                     for i in 0..3 {
-                        impulse[i] += row.lambda * lever.force[i];
-                        moment[i] += row.lambda * lever.moment[i];
+                        impulse[i] += lambda * lever.force[i];
+                        moment[i] += lambda * lever.moment[i];
                     }
                 }
             }
             let at = linkage.place(|k| state.pose(k as usize));
-            let arm = sub(at.anchor(), state.position[linkage.b as usize]);
+            let arm = sub(at.anchor(linkage.on_a), state.position[body as usize]);
             let about = cross(arm, impulse);
             let [angle, slide] = self.coordinates[j];
             let has = |c: Coordinate, x: f64| if linkage.kind.has(c) { x } else { 0.0 };
@@ -377,6 +394,11 @@ impl Lever {
     /// The rate that the body's velocities make.
     pub fn rate(&self, v: Vec3, spin: Vec3) -> f64 {
         (0..3).map(|k| self.row[k] * v[k] + self.row[3 + k] * spin[k]).sum()
+    }
+
+    /// The sizes of its terms together.
+    fn terms(&self, v: Vec3, spin: Vec3) -> f64 {
+        (0..3).map(|k| (self.row[k] * v[k]).abs() + (self.row[3 + k] * spin[k]).abs()).sum()
     }
 }
 
@@ -465,6 +487,7 @@ struct Step<'a> {
     scheme: &'a MoreauJean,
     world: &'a World,
     state: &'a State,
+    fitted: Option<&'a State>,
     bodies: &'a [Moving],
     h: f64,
 }
@@ -533,14 +556,18 @@ impl Step<'_> {
         wanted: Wanted,
     ) -> ScalarRow {
         let Wanted { bounds, compliance, mean, given, limit } = wanted;
-        let (mut before, mut moved, mut moved_end, mut size) = (0.0, 0.0, 0.0, given.abs());
+        let (mut before, mut moved, mut moved_end, mut unfit) = (0.0, 0.0, 0.0, 0.0);
         let mut ease = 0.0;
         for r in reach {
             let b = &self.bodies[r.body as usize];
             if b.free {
                 let (v, omega) = (b.v, b.omega(b.spin));
                 before += dot(r.force, v) + dot(r.moment, omega);
-                size += norm(r.force) * norm(v) + norm(r.moment) * norm(omega);
+                if let Some(fitted) = self.fitted {
+                    let slide = sub(v, fitted.velocity[r.body as usize]);
+                    let turn = sub(omega, fitted.angular_velocity(BodyId(r.body)));
+                    unfit += dot(r.force, slide) + dot(r.moment, turn);
+                }
                 ease = f64::max(ease, norm(r.force) + norm(r.moment) / b.radius);
             } else {
                 let (mean, end) = self.moved(r.body as usize);
@@ -549,11 +576,11 @@ impl Step<'_> {
             }
         }
         // What has a compliance is a force, no constraint: nothing is thrown back.
-        let fits = compliance > 0.0 || (before + moved + given).abs() <= UNFIT * size;
-        let mean = mean && fits;
+        let unfit = if compliance > 0.0 { 0.0 } else { unfit };
         let theta = self.scheme.theta;
+        let share = (1.0 - theta) / theta;
         let (given, share, compliance) = match mean {
-            true => ((moved + given) / theta, (1.0 - theta) / theta, compliance / theta),
+            true => ((moved + given) / theta - share * unfit, share, compliance / theta),
             false => (moved_end + given, 0.0, compliance),
         };
         let limit = limit.map(|e| Limit {
@@ -583,15 +610,15 @@ impl Step<'_> {
 
     /// The mean velocity in the step and that at its end of a body that is moved.
     fn moved(&self, k: usize) -> (Vec3, Vec3) {
-        match self.world.bodies[k].motion {
-            Motion::Uniform { velocity } => (velocity, velocity),
+        let motion = &self.world.bodies[k].motion;
+        let end = motion.velocity(self.state.t + self.h);
+        match *motion {
             Motion::Oscillating { amplitude, frequency, phase } => {
-                let at = |t: f64| oscillation(amplitude, frequency, phase, t);
-                let (first, last) = (at(self.state.t), at(self.state.t + self.h));
-                let mean = std::array::from_fn(|i| (last.0[i] - first.0[i]) / self.h);
-                (mean, last.1)
+                let at = |t: f64| oscillation(amplitude, frequency, phase, t).0;
+                let way = sub(at(self.state.t + self.h), at(self.state.t));
+                (scale(1.0 / self.h, way), end)
             }
-            _ => ([0.0; 3], [0.0; 3]),
+            _ => (end, end),
         }
     }
 }

@@ -70,13 +70,21 @@ fn joint(table: &JointTable, world: &World, key: &str) -> Result<Joint, Simulate
     let at = |name: &str| format!("{key}.{name}");
     let bodies = (body(&table.a, world, at("a"))?, body(&table.b, world, at("b"))?);
     let anchors = [table.anchor, table.anchor_b.unwrap_or(table.anchor)];
-    // A joint has its second body: where that is the world, the two change places and the axis turns round.
-    let (a, b, anchors, axis) = match bodies {
-        (a, Some(b)) => (a, b, anchors, table.axis),
-        (Some(a), None) => (None, a, [anchors[1], anchors[0]], table.axis.map(|x| -x)),
+    // A joint has its second body: where that is the world, the two change places and the axis turns round. Reports are on the second of the file.
+    let (a, b, anchors, axis, on_a) = match bodies {
+        (a, Some(b)) => (a, b, anchors, table.axis, false),
+        (Some(a), None) => (None, a, [anchors[1], anchors[0]], table.axis.map(|x| -x), true),
         (None, None) => {
             return Err(SimulateError::value(at("b"), "a body on one side", "`world` on both"));
         }
+    };
+    if on_a && matches!(table.kind, JointName::PointOnLine | JointName::PointOnPlane) {
+        let expected = "the body whose point it is, for line and plane are fixed in a";
+        return Err(SimulateError::value(at("b"), expected, "`world`"));
+    }
+    let (axis, reference) = match (table.kind, table.reference) {
+        (JointName::Universal, Some(reference)) if on_a => (reference, Some(table.axis)),
+        (_, reference) => (axis, reference),
     };
     if table.anchor_b.is_some() && table.kind != JointName::Distance {
         return Err(SimulateError::value(at("anchor_b"), "one of a `distance` only", "one"));
@@ -135,8 +143,9 @@ fn joint(table: &JointTable, world: &World, key: &str) -> Result<Joint, Simulate
         b,
         anchors,
         axis,
-        reference: table.reference,
+        reference,
         collide: table.collide,
+        on_a,
         drives,
     })
 }

@@ -12,7 +12,7 @@ use crate::moving::Moving;
 use crate::rotation::{Pose, cayley, inverse};
 use crate::state::{State, or_rest};
 use crate::world::oscillation;
-use crate::{Body, Dimension, Force, Geometry, Motion, World, Wrenches};
+use crate::{Body, Dimension, Force, Geometry, Motion, Stabilisation, World, Wrenches};
 
 /// What is the same at the beginning of every step, and the memory of forces.
 pub(super) struct Start {
@@ -103,8 +103,15 @@ impl Start {
         }
     }
 
-    /// Writes body k; a bound on the speed of its points in a cell that moves with this velocity.
-    fn body(&self, k: usize, stride: Stride, state: &State, cell: Vec3, b: &mut Moving) -> f64 {
+    /// Writes body k, which is extrapolated with the velocities of `moves`; a bound on the speed of its points in a cell that moves with this velocity.
+    fn body(
+        &self,
+        k: usize,
+        stride: Stride,
+        (state, moves): (&State, &State),
+        cell: Vec3,
+        b: &mut Moving,
+    ) -> f64 {
         let Stride { world, scheme, h } = stride;
         let (body, built) = (&world.bodies[k], &self.built[k]);
         let start = state.pose(k);
@@ -154,7 +161,7 @@ impl Start {
                 speed = norm(sub(b.v, cell)) + norm(spin) * built.reach;
                 for (pose, part) in [(&mut b.middle, 0.5), (&mut b.end, 1.0)] {
                     if turns {
-                        let (x, q) = advanced(state, k, part * h);
+                        let (x, q) = advanced(moves, k, part * h);
                         *pose = Pose { x, r: q.matrix() };
                     }
                 }
@@ -249,7 +256,11 @@ impl Tools {
         forces: &mut [Box<dyn Force>],
     ) -> bool {
         let Stride { world, scheme, h } = stride;
-        self.start.ask(state, forces, h);
+        self.joints.fit(scheme, world, state);
+        // The impulse that makes velocities fit acts where bodies come to with those they have; what that leaves of the rest of the step the projection takes.
+        let projected = scheme.stabilisation != Stabilisation::None;
+        let moves = self.joints.fitted.as_ref().filter(|_| !projected).unwrap_or(state);
+        self.start.ask(moves, forces, h);
         let gravity = norm(world.gravity);
         let (gamma, slack) = scheme.activation.forecast().unwrap_or((1.0, 0.0));
         // Bodies come together as fast as they move in their cells, and as these do.
@@ -266,7 +277,7 @@ impl Tools {
                 let cell = lattice
                     .as_ref()
                     .map_or([0.0; 3], |l| world.periodic.velocity_at(l, state.position[k]));
-                let speed = start.body(k, stride, state, cell, body) + closing;
+                let speed = start.body(k, stride, (state, moves), cell, body) + closing;
                 let fall = if body.free { h * h * gravity } else { 0.0 };
                 let least = (1e-6_f64).max(slack) * start.built[k].size;
                 *margin = (gamma + 1.0) * h * speed + fall + least;
@@ -291,7 +302,7 @@ impl Tools {
             self.bodies.push(Start::node(place, owner, (v, free), if stands { 0.0 } else { h }));
         }
         if self.joints.redundant.is_some() && scheme.geometry != Geometry::Frozen {
-            self.start.close_middle(&mut self.bodies, &self.joints, (world, state), h);
+            self.start.close_middle(&mut self.bodies, &self.joints, (world, moves), h);
         }
         finite
     }

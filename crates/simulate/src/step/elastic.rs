@@ -16,6 +16,7 @@ use nonsmooth_scenes::vec3::{Mat3, Vec3, add, scale};
 
 use super::Stride;
 use super::contact::Row;
+use super::rigid::Rigid;
 use crate::elastic::{Foot, Node, Nodes};
 use crate::report::EnergyBalance;
 use crate::state::State;
@@ -35,6 +36,10 @@ struct Solid {
     system: LinearSystem<3>,
     /// The work of the weights that the places without strain stand for: `Σ f · place`.
     height: f64,
+    /// Where nothing holds it.
+    rigid: Option<Rigid>,
+    /// α of its damping, `C = α M + β K`.
+    alpha: f64,
     /// Its nodes among all that may touch.
     nodes: std::ops::Range<usize>,
     /// M̂, with the h and θ that it is made for.
@@ -54,13 +59,16 @@ impl Solids {
         let nodes = Nodes::of(world);
         let solids = world.elastic.iter().enumerate().map(|(k, elastic)| {
             let system = LinearSystem::elastic(&elastic.solid, world.gravity)?;
-            let places = elastic.solid.places().flatten();
-            let height = system.load.iter().zip(places).map(|(f, x)| f * x).sum();
+            let places: Vec<Vec3> = elastic.solid.places().collect();
+            let height = system.load.iter().zip(places.as_flattened()).map(|(f, x)| f * x).sum();
+            let is_free = !elastic.solid.held.contains(&true);
             let own = |n: &Node| n.solid as usize == k;
             let first = nodes.list.iter().position(own).unwrap_or(0);
             let count = nodes.list.iter().filter(|n| own(n)).count();
             Ok(Solid {
                 height,
+                rigid: is_free.then(|| Rigid::new(&system.mass, &places)),
+                alpha: elastic.solid.material.alpha,
                 nodes: first..first + count,
                 hat: SquareCholesky::default(),
                 made_for: None,
@@ -201,10 +209,11 @@ impl Solids {
     /// The velocities of solid k after the step, with the impulses that it has; `tell` hears of its nodes and feet.
     pub fn respond(&mut self, k: u32, mut tell: impl FnMut(usize, Vec3)) {
         let solid = &mut self.solids[k as usize];
-        let Solid { hat, free, v, impulse, .. } = &mut *solid;
-        v.clone_from(impulse);
-        hat.solve(v);
-        v.iter_mut().zip(free).for_each(|(v, free)| *v += *free);
+        let mut v = std::mem::take(&mut solid.v);
+        v.clone_from(&solid.impulse);
+        solid.answer(&mut v);
+        v.iter_mut().zip(&solid.free).for_each(|(v, free)| *v += *free);
+        solid.v = v;
         for place in solid.nodes.clone() {
             tell(self.bodies + place, at(&solid.v, self.nodes.list[place].node));
         }
@@ -254,18 +263,44 @@ impl Solid {
             }
         }
         let LinearSystem { damping, stiffness, load, .. } = &self.system;
-        self.work.clear();
-        self.work.extend(x.iter().zip(v).map(|(x, v)| x + h * theta * v));
-        self.free.clone_from(load);
-        damping.mul_add(-1.0, v, &mut self.free);
-        stiffness.mul_add(-1.0, &self.work, &mut self.free);
-        self.free.iter_mut().for_each(|f| *f *= h);
-        self.hat.solve(&mut self.free);
-        self.free.iter_mut().zip(v).for_each(|(free, v)| *free += v);
+        let Self { rigid, work, free, .. } = self;
+        // f − C v − K x_θ; of what moves as a whole C v is α M v.
+        free.clone_from(load);
+        work.clear();
+        work.extend(x.iter().zip(v).map(|(x, v)| x + h * theta * v));
+        if let Some(rigid) = rigid {
+            rigid.remove(work);
+        }
+        stiffness.mul_add(-1.0, work, free);
+        work.copy_from_slice(v);
+        let part = rigid.as_ref().map(|rigid| rigid.remove(work));
+        damping.mul_add(-1.0, work, free);
+        if let (Some(rigid), Some(part)) = (rigid, part) {
+            rigid.add_momentum(part.map(|part| -self.alpha * part), free);
+            // Nothing inside of it moves it as a whole.
+            let outer = rigid.of_force(load);
+            let given = rigid.of_force(free);
+            let inner = std::array::from_fn(|i| outer[i] - self.alpha * part[i] - given[i]);
+            rigid.add_momentum(inner, free);
+        }
+        free.iter_mut().for_each(|f| *f *= h);
+        let mut free = std::mem::take(&mut self.free);
+        self.answer(&mut free);
+        free.iter_mut().zip(v).for_each(|(free, v)| *free += v);
+        self.free = free;
         self.v.clone_from(&self.free);
         self.impulse.clear();
         self.impulse.resize(v.len(), 0.0);
         super::are_finite(self.free.iter().copied())
+    }
+
+    /// `M̂⁻¹ x`.
+    fn answer(&mut self, x: &mut [f64]) {
+        let part = self.rigid.as_ref().map(|rigid| rigid.of_force(x));
+        self.hat.solve(x);
+        if let (Some(rigid), Some(part), Some((h, theta))) = (&self.rigid, part, self.made_for) {
+            rigid.set(part.map(|part| part / (1.0 + h * theta * self.alpha)), x);
+        }
     }
 
     fn factorise(&mut self, h: f64, theta: f64) -> Result<(), ()> {
@@ -285,16 +320,18 @@ impl Solid {
             return;
         }
         let mut blocks = vec![[[0.0; 3]; 3]; self.nodes.len()];
+        let mut work = std::mem::take(&mut self.work);
         for k in 0..3 {
-            self.work.clear();
-            self.work.resize(self.impulse.len(), 0.0);
-            self.work[3 * all[place].node as usize + k] = 1.0;
-            self.hat.solve(&mut self.work);
+            work.clear();
+            work.resize(self.impulse.len(), 0.0);
+            work[3 * all[place].node as usize + k] = 1.0;
+            self.answer(&mut work);
             for (block, other) in blocks.iter_mut().zip(&all[self.nodes.clone()]) {
-                let column = at(&self.work, other.node);
+                let column = at(&work, other.node);
                 (0..3).for_each(|l| block[l][k] = column[l]);
             }
         }
+        self.work = work;
         self.columns[own] = Some(blocks);
     }
 
@@ -305,7 +342,7 @@ impl Solid {
         old: &[f64],
         e: &mut EnergyBalance,
     ) {
-        let Self { system, height, v, work, .. } = self;
+        let Self { system, height, rigid, alpha, v, work, .. } = self;
         let theta = scheme.theta;
         let mut form = |a: &Csc, x: &[f64], y: &[f64]| {
             work.clear();
@@ -316,12 +353,23 @@ impl Solid {
         let both = || v.iter().zip(old);
         let mean: Vec<f64> = both().map(|(new, old)| theta * new + (1.0 - theta) * old).collect();
         let change: Vec<f64> = both().map(|(new, old)| new - old).collect();
-        let middle: Vec<f64> = x.iter().zip(&mean).map(|(x, v)| x + h * theta * v).collect();
         let end: Vec<f64> = x.iter().zip(&mean).map(|(x, v)| x + h * v).collect();
+        // Of strains alone; what moves as a whole is damped by α.
+        let mut middle: Vec<f64> = x.iter().zip(&mean).map(|(x, v)| x + h * theta * v).collect();
+        let (mut strained, mut straining) = (end.clone(), mean.clone());
+        let mut whole = 0.0;
+        if let Some(rigid) = rigid {
+            rigid.remove(&mut middle);
+            rigid.remove(&mut strained);
+            let part = rigid.remove(&mut straining);
+            whole = *alpha * part.iter().map(|x| x * x).sum::<f64>();
+        }
         let [before, after] = [old, v].map(|v| 0.5 * form(&system.mass, v, v));
         let numerical = (theta - 0.5) * form(&system.mass, &change, &change);
-        let inner = form(&system.damping, &mean, &mean) + form(&system.stiffness, &middle, &mean);
-        let strain = 0.5 * form(&system.stiffness, &end, &end);
+        let inner = form(&system.damping, &straining, &straining)
+            + whole
+            + form(&system.stiffness, &middle, &straining);
+        let strain = 0.5 * form(&system.stiffness, &strained, &strained);
         let along = |x: &[f64]| system.load.iter().zip(x).map(|(f, x)| f * x).sum::<f64>();
         let gravity = h * along(&mean);
         e.kinetic_before += before;

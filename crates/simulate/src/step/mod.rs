@@ -36,6 +36,7 @@ mod frame;
 mod global;
 mod memory;
 mod problem;
+mod rigid;
 mod solve;
 mod take;
 mod touching;

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
-use nonsmooth_linalg::{Block, Csc, budget};
+use nonsmooth_linalg::{Block, Csc, Inverse, budget};
 use nonsmooth_problem::factors::Factors;
 use nonsmooth_problem::{
     Bounds, Friction, FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, RowsLocal,
@@ -378,8 +378,7 @@ impl Parts<'_> {
                     let given = row.given[i] + row.shift[i];
                     let u = row.velocity(sides, i, given, bodies, free);
                     check += 0.0 * u;
-                    // Bodies that move together have no relative velocity: what rounding leaves of one would be a load of its own, to be borne to the last digit.
-                    q[i] = if u.abs() <= rounding { 0.0 } else { u };
+                    q[i] = unrounded(u, rounding);
                 }
             }
             for (all, holds) in holds.iter().zip([check == 0.0, symmetric, rigid]) {
@@ -555,14 +554,12 @@ impl Parts<'_> {
             }
         }
         let (mut bounds, mut s) = (Bounds { lower: vec![], upper: vec![] }, vec![]);
+        let mut sizes = vec![];
         for (j, k) in scalars.iter().map(|k| (k - contacts) as usize).enumerate() {
             let row = &joints.rows[k];
-            let mut free = row.shift;
-            for lever in joints.levers(k) {
-                let b = &bodies[lever.body as usize];
-                free += lever.rate(b.v_free, b.spin_free);
-            }
-            s.push(free);
+            let (free, terms) = joints.free(k, bodies);
+            s.push(unrounded(free, ROUNDING * terms));
+            sizes.push(terms);
             bounds.lower.push(row.bounds[0]);
             bounds.upper.push(row.bounds[1]);
             point.lambda.push(row.lambda);
@@ -572,6 +569,9 @@ impl Parts<'_> {
         let (n, p) = (D * sides.len(), scalars.len());
         let V = Csc::from_triplets(n, p, v.into_iter()).expect("in range");
         let R = Csc::from_triplets(p, p, r.into_iter()).expect("in range");
+        if joints.redundant.is_some() && finite {
+            agree(&R, &bounds, &mut s, &sizes);
+        }
         problem.rows = Some(RowsLocal { V, R, s, bounds });
         finite
     }
@@ -715,6 +715,62 @@ fn seen_from_the_other(shared: Shared) -> Shared {
 
 /// What rounding makes of a relative velocity at most, in parts of its terms: a dozen products of numbers that a few operations made.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// Bodies that move together have no relative velocity: what rounding leaves of one would be a load of its own, to be borne to the last digit.
+fn unrounded(velocity: f64, rounding: f64) -> f64 {
+    if velocity.abs() <= rounding { 0.0 } else { velocity }
+}
+
+/// What is not known of the rate of an equation at poses that are closed to rounding, in parts of its terms.
+const CLOSED: f64 = 128.0 * f64::EPSILON;
+/// Loads in which less than this share is rounding are as good as exact to the judge.
+const KNOWN: f64 = 1e-11;
+/// What is added to the diagonal of R so that it can be factorised, in parts of it.
+const REGULAR: f64 = 1e-12;
+
+/// Equations that follow from the others agree with them but for rounding, and no impulse bears the difference: it is taken out of the loads `s`. Where all of them are
+/// rounding there is no load; where it counts, those of the free rows become `R κ`, which impulses can answer, if none moves by more than is not known of it.
+/// The velocities of bodies carry their rounding from row to row, in units of √R_jj.
+#[allow(non_snake_case)]
+fn agree(R: &Csc, bounds: &Bounds, s: &mut [f64], terms: &[f64]) {
+    let unit: Vec<f64> = (0..s.len()).map(|j| R.get(j, j).sqrt()).collect();
+    let most = |x: &[f64]| {
+        let each = x.iter().zip(&unit).filter(|e| *e.1 > 0.0);
+        each.fold(0.0_f64, |most, (x, unit)| most.max(x.abs() / unit))
+    };
+    let (load, size) = (most(s), most(terms));
+    if load <= ROUNDING * size {
+        s.fill(0.0);
+    }
+    if load <= ROUNDING * size || ROUNDING * size <= KNOWN * load {
+        return;
+    }
+    let free: Vec<usize> = (0..s.len()).filter(|&j| bounds.is_free(j)).collect();
+    let mut place = vec![usize::MAX; s.len()];
+    free.iter().enumerate().for_each(|(k, &j)| place[j] = k);
+    let own = R.triplets().map(|(i, j, x)| (place[i], place[j], x));
+    let own = own.filter(|e| e.0.max(e.1) < usize::MAX);
+    let p = free.len();
+    let more = free.iter().enumerate().map(|(k, &j)| (k, k, REGULAR * unit[j] * unit[j]));
+    let matrices =
+        [Csc::from_triplets(p, p, own.clone()), Csc::from_triplets(p, p, own.chain(more))];
+    let [Ok(R), Ok(regular)] = matrices else { return };
+    let Ok(inverse) = Inverse::new(&regular, "R") else { return };
+    let mut answered: Vec<f64> = free.iter().map(|&j| s[j]).collect();
+    // What cannot be answered makes large impulses and these rounding, but for the second time; within each the second solve brings what the diagonal has kept off.
+    for _ in 0..2 {
+        let loads = std::mem::replace(&mut answered, vec![0.0; p]);
+        for _ in 0..2 {
+            let mut kappa: Vec<f64> = loads.iter().zip(&answered).map(|(s, x)| s - x).collect();
+            inverse.solve(&mut kappa);
+            R.mul_add(1.0, &kappa, &mut answered);
+        }
+    }
+    let all = || free.iter().zip(&answered);
+    if all().all(|(&j, x)| (x - s[j]).abs() <= CLOSED * size * unit[j]) {
+        all().for_each(|(&j, &x)| s[j] = x);
+    }
+}
 
 impl Row {
     /// Component i of a relative velocity: what is given and what free bodies make with these velocities.

@@ -44,7 +44,7 @@ impl Tools {
             }
         };
         drift.joints = violations.iter().copied().fold(0.0, f64::max);
-        self.joints.finish(state, &violations);
+        self.joints.finish(world, state, &violations);
     }
 
     /// How far quaternions were from length one.

@@ -107,12 +107,118 @@ fn a_robot_of_one_body_falls() {
     assert!(run.is_solved() && simulation.state().velocity[1][2] < -0.97, "{run}");
 }
 
+/// The usual anchor: a link `world` without mass that a fixed joint holds the base at. Others, as `base_footprint` of vehicles, move with it.
+#[test]
+fn a_root_without_mass_that_is_called_world_stands_with_what_is_fixed_to_it() {
+    let mass = r#"<inertial><mass value="5"/><inertia ixx="1" iyy="1" izz="1"/></inertial>"#;
+    let anchored = |root: &str, shape: &str| {
+        urdf(&format!(
+            r#"<robot name="arm"><link name="base">{mass}{shape}</link><link name="world">{root}</link>
+            <joint name="anchor" type="fixed"><parent link="world"/><child link="base"/><origin xyz="0 0 1"/></joint>
+            <link name="arm">{mass}</link>
+            <joint name="shoulder" type="continuous"><parent link="base"/><child link="arm"/></joint></robot>"#
+        ))
+        .unwrap()
+    };
+    let shape = r#"<collision><geometry><sphere radius="0.1"/></geometry></collision>"#;
+    for (root, shape, bodies, fixed) in
+        [("", shape, 2, true), ("", "", 1, false), (mass, shape, 2, false)]
+    {
+        let made = anchored(root, shape);
+        let simulation = SceneFile::parse(&made.scene, &[]).unwrap().build().unwrap();
+        assert_eq!(simulation.world().bodies.len(), bodies);
+        let scene: toml::Table = toml::from_str(&made.scene).unwrap();
+        let first = &scene["bodies"][0];
+        assert_eq!(first.get("fixed").is_some(), fixed, "{first:?}");
+        assert!(made.warnings.is_empty(), "{:?}", made.warnings);
+        let to = if bodies == 1 { "world" } else { "world_link" };
+        assert_eq!(scene["joints"][0]["a"].as_str(), Some(to));
+        if fixed {
+            near(&first["position"], &[0.0; 3]);
+            near(&first["shapes"][0]["position"], &[0.0, 0.0, 1.0]);
+        }
+    }
+    let vehicle = urdf(&format!(
+        r#"<robot name="car"><link name="base_footprint"/><link name="base_link">{mass}{shape}</link>
+        <joint name="foot" type="fixed"><parent link="base_footprint"/><child link="base_link"/></joint></robot>"#
+    ))
+    .unwrap();
+    let scene: toml::Table = toml::from_str(&vehicle.scene).unwrap();
+    assert!(scene["bodies"][0].get("fixed").is_none() && scene["bodies"][0].get("mass").is_some());
+    let said = "link `base_footprint`: a root without mass moves with what is fixed to it, as `base_link`; one called `world` would stand";
+    assert_eq!(vehicle.warnings, [said]);
+}
+
+#[test]
+fn what_planar_and_floating_joints_lose_is_said() {
+    let with = |kind: &str, numbers: &str| {
+        let text = ROBOT.replace("\"revolute\"", &format!("\"{kind}\""));
+        let text = text.replace("<mimic joint=\"shoulder\" multiplier=\"3\"/>", "");
+        urdf(&text.replace("damping=\"0.5\" friction=\"0.1\"", numbers)).unwrap().warnings
+    };
+    for kind in ["planar", "floating"] {
+        let warnings = with(kind, "damping=\"0.5\"");
+        for names in ["lower and upper", "damping and friction"] {
+            let says = format!("joint `shoulder`: {names} of a {kind} joint are left out");
+            assert!(warnings.contains(&says), "{warnings:?}");
+        }
+        assert!(!with(kind, "damping=\"0\"").iter().any(|w| w.contains("damping")));
+    }
+}
+
+/// From version 1.1 on an orientation may be a quaternion.
+#[test]
+fn quaternions_have_a_meaning_in_later_versions() {
+    let turned = "rpy=\"0 0 1.5707963267948966\"";
+    let text = |version: &str| {
+        let text = ROBOT.replace(turned, "quat_xyzw=\"0 0 3 3\"");
+        text.replace(
+            "name=\"arm\">\n  <link name=\"base",
+            &format!("name=\"arm\"{version}>\n  <link name=\"base"),
+        )
+    };
+    let place = |text: &str| {
+        let made = urdf(text).unwrap();
+        let scene: toml::Table = toml::from_str(&made.scene).unwrap();
+        let warned = made
+            .warnings
+            .iter()
+            .any(|w| w.starts_with("joint `shoulder`: `quat_xyzw` is left out"));
+        (scene["bodies"][1]["position"].clone(), warned)
+    };
+    let (at, warned) = place(&text(" version=\"1.1\""));
+    near(&at, &[0.0, 2.0 / 3.0, 2.0]);
+    assert!(!warned);
+    for version in ["", " version=\"1.0\""] {
+        let (at, warned) = place(&text(version));
+        near(&at, &[2.0 / 3.0, 0.0, 2.0]);
+        assert!(warned);
+    }
+    for (own, says) in [
+        (
+            format!("{turned} quat_xyzw=\"0 0 1 1\""),
+            "expected either `rpy` or `quat_xyzw`, found both",
+        ),
+        ("quat_xyzw=\"0 0 0 0\"".into(), "expected a quaternion as `quat_xyzw`, found zero"),
+        ("quat_xyzw=\"0 0 0\"".into(), "origin.quat_xyzw: expected 4 numbers, found 3"),
+    ] {
+        let text = text(" version=\"1.1\"").replace("quat_xyzw=\"0 0 3 3\"", &own);
+        let error = urdf(&text).unwrap_err().to_string();
+        assert!(error.starts_with("joint `shoulder`") && error.ends_with(says), "{error}");
+    }
+}
+
 #[test]
 fn what_is_no_robot_is_refused_in_one_line() {
     for (from, to, says) in [
         ("<robot name=\"arm\">", "<robot", "robot: expected an XML document"),
         ("type=\"revolute\"", "type=\"hinge\"", "joint `shoulder`.type: expected fixed, revolute"),
         ("type=\"revolute\"", "", "joint `shoulder`: expected <joint> with `type`, found none"),
+        (
+            "<limit lower=\"-1\" upper=\"2\" effort=\"10\" velocity=\"1\"/>",
+            "",
+            "joint `shoulder`: expected <limit>, which a revolute joint has, found none",
+        ),
         (
             "<child link=\"arm\"/>",
             "<child link=\"ram\"/>",

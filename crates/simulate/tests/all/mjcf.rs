@@ -281,6 +281,192 @@ fn actuators_of_a_class_share_their_default() {
     }
 }
 
+/// A hinge with an actuator, at 0.3 rad with a control of 0.8.
+fn hinge(head: &str, joint: &str, actuator: &str) -> Result<Imported, String> {
+    let text = format!(
+        "<mujoco>{head}<worldbody><body><joint name='j' axis='0 1 0' {joint}/><geom pos='1 0 0' size='0.1'/>\
+         </body></worldbody><actuator>\n<{actuator} joint='j'/></actuator>\
+         <keyframe><key qpos='0.3' ctrl='0.8'/></keyframe></mujoco>"
+    );
+    mjcf(&text, Path::new("")).map_err(|e| e.to_string())
+}
+
+/// What is limited is MuJoCo's: of a range that nothing is said of, one whose numbers rise.
+#[test]
+fn ranges_that_do_not_rise_are_none() {
+    let by_hand = "<compiler autolimits='false'/>";
+    let class = "<default><joint range='-9 9'/></default>";
+    for (head, joint, limited) in [
+        ("", "range='-9 9'", true),
+        ("", "range='0 0'", false),
+        (class, "range='0 0'", false),
+        (class, "", true),
+        ("", "range='9 -9'", false),
+        ("", "range='-9 9' limited='false'", false),
+        (by_hand, "range='-9 9' limited='true'", true),
+        (by_hand, "range='0 0'", false),
+    ] {
+        let made = hinge(head, joint, "position kp='10'").unwrap();
+        let found = table(&made)["joints"][0].get("limits").is_some();
+        assert_eq!(found, limited, "{head} {joint}");
+    }
+    for (head, actuator, control, max) in [
+        ("", "position kp='10' ctrlrange='0 0' forcerange='0 0'", 0.8, None),
+        ("", "position kp='10' ctrlrange='0 0.5' forcerange='-1 1'", 0.5, Some(1.0)),
+        ("", "position kp='10' ctrlrange='0 0.5' ctrllimited='false'", 0.8, None),
+        (by_hand, "position kp='10' ctrlrange='0 0' forcerange='0 0'", 0.8, None),
+        (by_hand, "position kp='10' forcerange='-1 1' forcelimited='true'", 0.8, Some(1.0)),
+        (by_hand, "position kp='10' forcerange='-1 1' forcelimited='false'", 0.8, None),
+        (
+            "<option><flag clampctrl='disable'/></option>",
+            "position kp='10' ctrlrange='0 0.5'",
+            0.8,
+            None,
+        ),
+    ] {
+        let made = hinge(head, "", actuator).unwrap();
+        let motor = &table(&made)["joints"][0]["motor"];
+        let position = motor["position"].as_float().unwrap();
+        assert!((position + 0.3 - control).abs() < 1e-15, "{actuator} {position}");
+        assert_eq!(motor.get("max").and_then(toml::Value::as_float), max, "{actuator}");
+    }
+    for (head, joint, actuator, error) in [
+        (
+            by_hand,
+            "range='-9 9'",
+            "motor",
+            "<joint> `j` (line 1): expected `limited` beside `range`, without autolimits, found none",
+        ),
+        (
+            by_hand,
+            "",
+            "position ctrlrange='0 1'",
+            "<position> (line 2): expected `ctrllimited` beside `ctrlrange`, without autolimits, found none",
+        ),
+        (
+            by_hand,
+            "",
+            "position forcerange='0 1'",
+            "<position> (line 2): expected `forcelimited` beside `forcerange`, without autolimits, found none",
+        ),
+        (
+            "",
+            "range='0 0' limited='true'",
+            "motor",
+            "<joint> `j` (line 1): expected a number and a larger one as `range`, found `0 0`",
+        ),
+        (
+            "",
+            "",
+            "position forcelimited='true'",
+            "<position> (line 2): expected a number and a larger one as `forcerange`, found none",
+        ),
+    ] {
+        assert_eq!(hinge(head, joint, actuator).unwrap_err(), error);
+    }
+}
+
+#[test]
+fn actuators_that_are_left_out_are_said_to_act_where_they_do() {
+    let idle =
+        "<motor> (line 2): its control comes from outside, so it does nothing here: left out";
+    let acts = "(line 2): left out, with what it does without a control: motors of scenes are";
+    for (head, actuator, says) in [
+        ("", "motor ctrlrange='-1 0'", idle),
+        ("", "motor", "<motor> (line 2): left out, with its control of 0.8"),
+        ("", "motor ctrlrange='1 2'", "<motor> (line 2): left out, with its control of 1"),
+        ("", "motor armature='1'", "<motor> (line 2): `armature` is left out"),
+        ("", "general biastype='affine' biasprm='1 -5 -.2'", acts),
+        ("", "intvelocity kp='5' actrange='-1 1'", acts),
+        ("", "position damping='1'", "<position> (line 2): `damping` is left out"),
+        ("", "velocity delay='0.1' nsample='3'", "<velocity> (line 2): `delay` is left out"),
+        ("", "position foo='1'", "<position> (line 2): `foo` is left out"),
+        (
+            "<option actuatorgroupdisable='1'/><option actuatorgroupdisable='2 3'/>",
+            "position group='1'",
+            "<position> (line 2): left out: its group is disabled",
+        ),
+    ] {
+        let made = hinge(head, "", actuator).unwrap();
+        assert!(said(&made, says), "{actuator}: {:?}", made.warnings);
+        let motor = table(&made)["joints"][0].get("motor").is_some();
+        let servo = actuator.starts_with("position") || actuator.starts_with("velocity");
+        assert_eq!(motor, servo && head.is_empty());
+    }
+    let general = "<default><general dyntype='filter' dynprm='1'/></default>";
+    let made = hinge(general, "", "position kp='10' armature='0' delay='0'").unwrap();
+    assert!(!said(&made, "is left out"), "{:?}", made.warnings);
+    let error = hinge("<option actuatorgroupdisable='31'/>", "", "motor").unwrap_err();
+    assert!(error.starts_with("<option> (line 1): expected whole numbers of 0 to 30"), "{error}");
+}
+
+#[test]
+fn attributes_of_options_frames_and_inertials_that_are_not_known_are_said() {
+    let model = |head: &str| {
+        import(&format!(
+            "<mujoco>{head}<worldbody><frame poss='1 2 3'><body><freejoint/>\n\
+             <inertial mas='3' pos='0 0 0' mass='1' diaginertia='1 1 1'/></body></frame></worldbody></mujoco>"
+        ))
+    };
+    let made = model("<option foo='1' solver='CG' o_margin='1'/><compiler alignfree='true'/>");
+    for words in [
+        "<option> (line 1): `foo` is left out",
+        "<option> (line 1): `o_margin` is left out",
+        "<compiler> (line 1): `alignfree` is left out, for `qpos` of a keyframe",
+        "<frame> (line 1): `poss` is left out",
+        "<inertial> (line 2): `mas` is left out",
+    ] {
+        assert!(said(&made, words), "{words}: {:?}", made.warnings);
+    }
+    let made = model("<option cone='elliptic'/><compiler alignfree='false'/>");
+    assert!(!said(&made, "<option>") && !said(&made, "alignfree"), "{:?}", made.warnings);
+}
+
+/// With the flag all contacts have the friction of the option, MuJoCo's 1 and 1e-4 where it ends early.
+#[test]
+fn a_flag_puts_the_friction_of_the_option_before_that_of_geoms() {
+    let law = |option: &str| {
+        let made = import(&format!(
+            "<mujoco><option {option}</option><worldbody><geom type='plane' size='1 1 1' friction='0.5'/>\
+             <body pos='0 0 1'><freejoint/><geom size='0.1' condim='6' friction='2 1 0.3' priority='1'/>\
+             </body></worldbody></mujoco>"
+        ));
+        let scene = table(&made);
+        let of_both = |pair: &&toml::Value| pair["between"][0] != pair["between"][1];
+        let law = scene["pairs"].as_array().unwrap().iter().find(of_both).unwrap().clone();
+        [law["mu"].as_float().unwrap(), law["mu_rolling"].as_float().unwrap()]
+    };
+    let on = "<flag override='enable'/>";
+    assert_eq!(law("o_friction='.3 .4 .1 .02 .2'>"), [2.0, 0.3]);
+    assert_eq!(law(&format!("o_friction='.3 .4 .1 .02 .2'>{on}")), [0.3, 0.02]);
+    assert_eq!(law(&format!("o_friction='.3'>{on}")), [0.3, 1e-4]);
+    assert_eq!(law(&format!(">{on}")), [1.0, 1e-4]);
+}
+
+/// MuJoCo lets a child and its parent pass through each other, also one that moves with all six coordinates.
+#[test]
+fn a_child_that_moves_freely_passes_through_its_parent() {
+    let model = |option: &str| {
+        import(&format!(
+            "<mujoco><option gravity='0 0 0'>{option}</option><worldbody>\
+             <body name='a'><joint axis='0 1 0'/><geom size='0.1' pos='0.01 0 0'/>\
+             <body name='b' pos='0.15 0 0'><joint type='slide' axis='1 0 0'/><joint type='slide' axis='0 1 0'/>\
+             <joint type='slide' axis='0 0 1'/><joint type='ball'/><geom size='0.1'/></body></body>\
+             <body name='c' pos='0 0 1'><freejoint/><geom size='0.1'/></body></worldbody></mujoco>"
+        ))
+    };
+    let made = model("");
+    let scene = table(&made);
+    let meets = |k: usize, l: usize| {
+        let of = |k: usize, name: &str| scene["bodies"][k][name].as_array().unwrap().clone();
+        of(k, "collides_with").contains(&of(l, "groups")[0])
+    };
+    assert!(!meets(0, 1) && !meets(1, 0) && meets(0, 2) && meets(2, 1));
+    assert!(simulation(&made).run(0.01, 1e-3, &mut ()).unwrap().is_solved());
+    let made = model("<flag filterparent='disable'/>");
+    assert!(SceneFile::parse(&made.scene, &[]).unwrap().build().is_err());
+}
+
 #[test]
 fn keyframes_place_bodies_that_are_led_and_open_welds_are_named() {
     let model = |key: &str| {
@@ -466,6 +652,10 @@ fn meshes_and_height_fields_are_shapes_and_included_files_are_read() {
     assert_eq!(shape["scale"].as_float(), Some(2.0));
     near(&hull["position"], &[3.25, 0.25, 1.75]);
     assert_eq!(hull["shapes"][0]["shape"]["vertices"].as_array().unwrap().len(), 4);
+    let stripped = model.replace("<mesh file=\"tetra", "<mesh file=\"C:\\else/where/tetra");
+    assert!(mjcf(&stripped, &folder).is_err());
+    let stripped = stripped.replace("<compiler ", "<compiler strippath=\"true\" ");
+    assert_eq!(mjcf(&stripped, &folder).unwrap().scene, made.scene);
     // Mistakes in an included file name it.
     std::fs::write(folder.join("body.xml"), "<x>\n\n<body><geom size='-1'/></body></x>").unwrap();
     let error = mjcf(model, &folder).unwrap_err().to_string();
@@ -548,6 +738,10 @@ fn what_is_not_in_the_subset_is_one_line_with_element_and_line() {
         (body("<geom size='1'/><body><freejoint/></body>"), "<freejoint> (line 4): expected a free joint of a body in the world"),
         (body("<geom type='mesh' mesh='m'/>"), "<geom> (line 4): expected a mesh of <asset>, found `m`"),
         (body("<geom size='1' quat='1 0 0 0' euler='0 0 0'/>"), "<geom> (line 4): expected one orientation"),
+        (
+            "<mujoco><asset>\n<mesh name='m' vertex='0 0 0 1 0 0 0 1 0 0 0 1' face='0 2 1 0 1 3.7 0 3 2 1 2 3'/></asset><worldbody><body><freejoint/><geom type='mesh' mesh='m'/></body></worldbody></mujoco>".to_owned(),
+            "<mesh> `m` (line 2): expected whole numbers of at least 0 as `face`, found 3.7",
+        ),
         (
             "<mujoco><worldbody>\n<body><joint/><joint type='ball'/><geom size='1'/></body></worldbody></mujoco>".to_owned(),
             "<body> (line 2): expected joints that are free, ball, hinge,",

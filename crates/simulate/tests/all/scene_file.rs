@@ -503,6 +503,46 @@ force = [0.1, 0]
 at = [0.1, 0.1]
 "#;
 
+/// The weight of 2 kg half a metre from the anchor, and a turn by 0.1: of both it is said what the second partner has, though it is the world.
+#[test]
+fn a_joint_to_the_world_reports_what_acts_on_the_world() {
+    let of = |kind: &str, [a, b]: [&str; 2]| {
+        let scene = format!(
+            r#"
+            format = "nonsmooth-scene"
+            version = 1
+            time = {{ h = 1e-2, end = 0.1 }}
+            joints = [{{ kind = "{kind}", a = "{a}", b = "{b}", axis = [0, 0, 1] }}]
+            [[bodies]]
+            name = "arm"
+            mass = 2
+            inertia = [0.1, 0.1, 0.1]
+            position = [0.5, 0, 0]
+            velocity = [0, {0}, 0]
+            angular_velocity = [0, 0, {1}]
+            "#,
+            if kind == "fixed" { 0.0 } else { 0.5 },
+            if kind == "fixed" { 0.0 } else { 1.0 },
+        );
+        let mut simulation = SceneFile::parse(&scene, &[]).unwrap().build().unwrap();
+        let report = simulation.run(0.1, 1e-2, &mut ()).unwrap();
+        assert!(report.is_solved(), "{report}");
+        simulation.joints()[0]
+    };
+    for (bodies, sign) in [(["world", "arm"], 1.0), (["arm", "world"], -1.0)] {
+        let weld = of("fixed", bodies);
+        assert!((weld.impulse[2] - sign * 2.0 * 9.81e-2).abs() < 1e-12, "{weld:?}");
+        assert!((weld.moment[1] + sign * 9.81e-2).abs() < 1e-12, "{weld:?}");
+        let hinge = of("revolute", bodies);
+        assert!((hinge.angle - sign * 0.1).abs() < 1e-5, "{hinge:?}");
+        assert!((hinge.impulse[2] - sign * 2.0 * 9.81e-2).abs() < 1e-12, "{hinge:?}");
+        // Centripetal, m ω² r towards the anchor on the arm.
+        let (x, y) = (hinge.impulse[0], hinge.impulse[1]);
+        assert!((x + sign * 1e-2 * 0.095_f64.cos()).abs() < 1e-5, "{hinge:?}");
+        assert!((y + sign * 1e-2 * 0.095_f64.sin()).abs() < 1e-5, "{hinge:?}");
+    }
+}
+
 #[test]
 fn a_scene_in_the_plane_has_vectors_of_two_and_turns_of_one() {
     let scene = SceneFile::parse(PLANE, &["bodies[1].velocity=[2, 0]"]).unwrap();
@@ -682,6 +722,37 @@ fn a_joint_to_the_world_may_be_told_either_way() {
     };
     assert!((angle("world", "arm", 1.0) - 0.1).abs() < 1e-6);
     assert!((angle("arm", "world", -1.0) - 0.1).abs() < 1e-6);
+}
+
+/// Of a universal joint each partner has its axis, whichever is named first; a line and a plane are the first one's.
+#[test]
+fn axes_stay_with_the_partner_that_they_are_of() {
+    let joint = |joint: &str| {
+        let text = format!(
+            r#"
+            format = "nonsmooth-scene"
+            version = 1
+            bodies = [{{ name = "arm", mass = 1, inertia = [1, 1, 1] }}]
+            joints = [{{ {joint} }}]
+            "#
+        );
+        let scene = SceneFile::parse(&text, &[]).unwrap();
+        scene.build().map(|s| s.world().joints[0].clone()).map_err(|e| e.to_string())
+    };
+    let told =
+        r#"kind = "universal", a = "arm", b = "world", axis = [1, 0, 0], reference = [0, 0, 1]"#;
+    let turned =
+        r#"kind = "universal", a = "world", b = "arm", axis = [0, 0, 1], reference = [1, 0, 0]"#;
+    let (told, turned) = (joint(told).unwrap(), joint(turned).unwrap());
+    assert_eq!(
+        (told.axis, told.reference, told.a, told.b),
+        (turned.axis, turned.reference, turned.a, turned.b)
+    );
+    for kind in ["point_on_line", "point_on_plane"] {
+        let said = joint(&format!(r#"kind = "{kind}", a = "arm", b = "world""#)).unwrap_err();
+        assert!(said.contains("joints[0].b: expected the body whose point it is"), "{said}");
+        assert!(joint(&format!(r#"kind = "{kind}", a = "world", b = "arm""#)).is_ok());
+    }
 }
 
 /// A ball in a world that repeats itself, with `more` in its table.

@@ -14,6 +14,7 @@
 //! Source: Khobotov1987; SolodovTseng1996; HanLo2002 for steps that grow again; AcaryBremondHuber2018, who call the two
 //! rules UPK and UPTS.
 
+use nonsmooth_linalg::budget;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +32,7 @@ pub struct StepRule {
     pub accept: f64,
     /// Lengthen the next step after a ratio below this, in (0, accept).
     pub grow_below: f64,
-    /// The factor by which a step is shortened, in (0, 1); its inverse lengthens.
+    /// The factor by which a step is shortened, in (0, 0.99); its inverse lengthens.
     pub shrink: f64,
     /// Steps between two evaluations of the true residual, unless the estimate asks for one earlier.
     pub check_every: usize,
@@ -58,20 +59,22 @@ impl Settings for StepRule {
     fn validate(&self) -> Result<(), String> {
         below("accept", self.accept, 1.0)?;
         below("grow_below", self.grow_below, self.accept)?;
-        below("shrink", self.shrink, 1.0)?;
+        below("shrink", self.shrink, MILDEST)?;
         at_least("check_every", self.check_every, 1)
     }
 }
 
+/// A milder factor would shorten for ever, or not at all.
+const MILDEST: f64 = 0.99;
 /// Steps are no longer than this, whatever the ratios say.
 const LONGEST: f64 = 1e300;
 
 impl StepRule {
-    /// Shortens ρ until the ratio that the prediction has with it is acceptable; the ratio. NaN, where nothing moves, is; infinite, where F is not defined, is not, whatever ρ.
+    /// Shortens ρ until the ratio that the prediction has with it is acceptable, or the time is over; the ratio. NaN, where nothing moves, is; infinite, where F is not defined, is not, whatever ρ.
     pub(crate) fn shorten(&self, rho: &mut f64, mut predict: impl FnMut(f64) -> f64) -> f64 {
         loop {
             let ratio = predict(*rho);
-            if ratio.is_nan() || ratio <= self.accept || *rho < 1e-300 {
+            if ratio.is_nan() || ratio <= self.accept || *rho < 1e-300 || budget::over() {
                 return ratio;
             }
             *rho *= self.shrink;

@@ -1,5 +1,6 @@
 //! What `compiler` and `option` say: units, orders of turning, and which numbers follow from which.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use nonsmooth_scenes::Rotation;
@@ -9,6 +10,36 @@ use super::document::{Defaults, Element, Item, MAIN};
 use crate::SimulateError;
 use crate::import::{Frame, about};
 use crate::rotation::unit;
+
+/// Attributes of options that are read, or of solvers, sensors, air and laws of contact that are not ours.
+const OF_OPTIONS: [&str; 26] = [
+    "gravity",
+    "timestep",
+    "density",
+    "viscosity",
+    "wind",
+    "magnetic",
+    "actuatorgroupdisable",
+    "o_friction",
+    "o_solref",
+    "o_solimp",
+    "impratio",
+    "cone",
+    "integrator",
+    "jacobian",
+    "solver",
+    "iterations",
+    "tolerance",
+    "ls_iterations",
+    "ls_tolerance",
+    "noslip_iterations",
+    "noslip_tolerance",
+    "ccd_iterations",
+    "ccd_tolerance",
+    "sdf_initpoints",
+    "sdf_iterations",
+    "sleep_tolerance",
+];
 
 /// How the numbers of a model are meant.
 pub(super) struct Compiler {
@@ -24,12 +55,21 @@ pub(super) struct Compiler {
     /// Added to the path of a mesh, and of a height field.
     pub meshdir: String,
     pub assetdir: String,
+    /// Whether files are looked for by their names without their folders.
+    pub strippath: bool,
     pub gravity: Vec3,
     /// Whether a flag takes gravity away, whatever `gravity` says.
     weightless: bool,
     pub h: f64,
     /// Whether parent and child pass through each other.
     pub filter: bool,
+    /// Whether controls stay in their ranges.
+    pub clamps: bool,
+    /// The groups of actuators that do nothing.
+    pub disabled: BTreeSet<i64>,
+    /// The friction of all contacts (two of sliding, one of turning, two of rolling), and whether it goes before that of the geoms.
+    friction: [f64; 5],
+    overrides: bool,
 }
 
 impl Compiler {
@@ -48,10 +88,15 @@ impl Compiler {
             folder,
             meshdir: String::new(),
             assetdir: String::new(),
+            strippath: false,
             gravity: [0.0, 0.0, -9.81],
             weightless: false,
             h: 2e-3,
             filter: true,
+            clamps: true,
+            disabled: BTreeSet::new(),
+            friction: [1.0, 1.0, 5e-3, 1e-4, 1e-4],
+            overrides: false,
         };
         for element in root.named("compiler") {
             out.compiler(&defaults.item(element, MAIN)?, said)?;
@@ -98,9 +143,15 @@ impl Compiler {
                 "settotalmass" | "boundmass" | "boundinertia" | "balanceinertia" => {
                     said.push(format!("{}: `{name}` changes masses and is left out", item.key()));
                 }
+                "strippath" => self.strippath = item.flag(name, false)?,
+                "alignfree" if !item.flag(name, false)? => {}
+                "alignfree" => said.push(format!(
+                    "{}, for `qpos` of a keyframe is taken for that of the bodies as they are written",
+                    left_out(item, name)
+                )),
                 // What has to do with pictures, speed, or how the model is kept.
-                "texturedir" | "strippath" | "discardvisual" | "usethread" | "fusestatic"
-                | "alignfree" | "exactmeshinertia" | "saveinertial" | "conflict" => {}
+                "texturedir" | "discardvisual" | "usethread" | "fusestatic"
+                | "exactmeshinertia" | "saveinertial" | "conflict" => {}
                 other => said.push(left_out(item, other)),
             }
         }
@@ -115,12 +166,23 @@ impl Compiler {
                 said.push(format!("{}: `{name}`: air and water are left out", item.key()));
             }
         }
+        unknown(item, &OF_OPTIONS, said);
+        self.friction = item.list("o_friction", self.friction)?;
+        for group in item.numbers("actuatorgroupdisable")?.unwrap_or_default() {
+            if !(0.0..=30.0).contains(&group) || group.fract() != 0.0 {
+                let expected = "whole numbers of 0 to 30 as `actuatorgroupdisable`";
+                return Err(item.wrong(expected, group));
+            }
+            self.disabled.insert(group as i64);
+        }
         for flag in item.element.named("flag") {
             for (name, text) in &flag.attributes {
                 match (name.as_str(), text.as_str()) {
                     // The last of several flags holds.
                     ("gravity", text) => self.weightless = text == "disable",
                     ("filterparent", text) => self.filter = text != "disable",
+                    ("clampctrl", text) => self.clamps = text != "disable",
+                    ("override", text) => self.overrides = text == "enable",
                     (
                         "contact" | "limit" | "equality" | "frictionloss" | "passive" | "spring"
                         | "damper" | "constraint" | "actuation",
@@ -131,6 +193,12 @@ impl Compiler {
             }
         }
         Ok(())
+    }
+
+    /// The coefficients of sliding and rolling friction of all contacts, where they go before those of the geoms.
+    pub fn friction(&self) -> Option<[f64; 2]> {
+        let [sliding, _, _, rolling, _] = self.friction.map(|x| x.max(0.0));
+        self.overrides.then_some([sliding, rolling])
     }
 
     /// Where an element is in that around it: `pos`, and one of the ways to say an orientation.
@@ -187,6 +255,12 @@ impl Compiler {
 /// That an attribute is not in the subset.
 pub(super) fn left_out(item: &Item, name: &str) -> String {
     format!("{}: `{name}` is left out", item.key())
+}
+
+/// Says which attributes of an element are not in the subset.
+pub(super) fn unknown(item: &Item, known: &[&str], said: &mut Vec<String>) {
+    let names = item.names().into_iter().filter(|name| !known.contains(name));
+    said.extend(names.map(|name| left_out(item, name)));
 }
 
 /// The axes that Euler's angles turn about, small letters those that move along.

@@ -4,8 +4,10 @@ use std::collections::BTreeSet;
 
 use serde_json::{Value, json};
 
+use super::compiler::Compiler;
 use super::document::{Defaults, Element, MAIN};
 use super::geoms::{Geom, Touch};
+use super::joints::is_free;
 use super::model::Tree;
 use crate::SimulateError;
 
@@ -29,10 +31,11 @@ impl Contacts {
     pub fn read(
         root: &Element,
         defaults: &Defaults,
+        compiler: &Compiler,
         tree: &mut Tree,
     ) -> Result<Self, SimulateError> {
         let mut said = vec![];
-        let this = Self::of_tree(root, defaults, tree, &mut said)?;
+        let this = Self::of_tree(root, defaults, compiler, tree, &mut said)?;
         tree.said.extend(said);
         Ok(this)
     }
@@ -40,6 +43,7 @@ impl Contacts {
     fn of_tree(
         root: &Element,
         defaults: &Defaults,
+        compiler: &Compiler,
         tree: &Tree,
         said: &mut Vec<String>,
     ) -> Result<Self, SimulateError> {
@@ -74,6 +78,13 @@ impl Contacts {
             };
             let (a, b) = (of("body1")?, of("body2")?);
             apart.insert([a.min(b), a.max(b)]);
+        }
+        // Elsewhere the joint to the parent keeps the two from touching; a body with all six coordinates has none in the scene.
+        for (k, body) in tree.bodies.iter().enumerate().filter(|_| compiler.filter) {
+            let parent = tree.carrier(body.parent);
+            if parent != 0 && is_free(&body.joints) {
+                apart.insert([k.min(parent), k.max(parent)]);
+            }
         }
         for element in root.named("contact").flat_map(|c| c.named("pair")) {
             let item = defaults.item(element, MAIN)?;

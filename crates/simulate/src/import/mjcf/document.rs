@@ -166,8 +166,17 @@ struct Class {
 }
 
 /// Lists that may end early: what is said further out holds beyond their end.
-const LISTS: [&str; 8] =
-    ["friction", "size", "polycoef", "gear", "gainprm", "biasprm", "stiffness", "damping"];
+const LISTS: [&str; 9] = [
+    "friction",
+    "o_friction",
+    "size",
+    "polycoef",
+    "gear",
+    "gainprm",
+    "biasprm",
+    "stiffness",
+    "damping",
+];
 
 /// A list with the numbers of another one beyond its end.
 fn laid(over: &str, under: &str) -> String {
@@ -355,6 +364,37 @@ impl<'a> Item<'a> {
     /// A number, or what stands for it where none is given.
     pub fn real(&self, name: &str, other: f64) -> Result<f64, SimulateError> {
         Ok(self.some::<1>(name)?.map_or(other, |[x]| x))
+    }
+
+    /// Whether it is there and says anything but zeros.
+    pub fn acts(&self, name: &str) -> bool {
+        let zero = |text: &str| text.split_whitespace().all(|x| x.parse() == Ok(0.0));
+        self.text(name).is_some_and(|text| !zero(text))
+    }
+
+    /// The range that is in force: where `limited` leaves it open and the compiler decides (`auto`), one whose first number is below the second.
+    ///
+    /// Errors: a range in force that is none; one that neither decides about.
+    pub fn range(
+        &self,
+        name: &str,
+        limited: &str,
+        auto: bool,
+    ) -> Result<Option<[f64; 2]>, SimulateError> {
+        let range = self.some::<2>(name)?;
+        let rising = range.filter(|[lower, upper]| lower < upper);
+        match [self.flag(limited, false)?, self.flag(limited, true)?] {
+            [false, false] => Ok(None),
+            [true, _] if rising.is_none() => {
+                let found = self.text(name).map_or("none".into(), |text| format!("`{text}`"));
+                Err(self.wrong(format!("a number and a larger one as `{name}`"), found))
+            }
+            [false, true] if !auto && self.acts(name) => {
+                let expected = format!("`{limited}` beside `{name}`, without autolimits");
+                Err(self.wrong(expected, "none"))
+            }
+            _ => Ok(rising),
+        }
     }
 
     /// A whole number of 32 bits.

@@ -7,7 +7,7 @@ use nonsmooth_scenes::vec3::{Vec3, apply, norm, scale, sub};
 use nonsmooth_scenes::{MassProperties, Polyhedron};
 use serde_json::{Value, json};
 
-use super::compiler::{Compiler, from_third, left_out};
+use super::compiler::{Compiler, from_third, unknown};
 use super::document::{Defaults, Element, Item, MAIN};
 use crate::import::Frame;
 use crate::scene_file::{ShapeTable, load_mesh};
@@ -126,7 +126,7 @@ impl<'a> Assets<'a> {
             let item = defaults.item(element, MAIN)?;
             let stem = || {
                 let file = item.text("file")?;
-                let name = file.rsplit(['/', '\\']).next().unwrap_or(file);
+                let name = bare(file);
                 Some(name.rsplit_once('.').map_or(name, |(stem, _)| stem).to_owned())
             };
             let Some(name) = item.text("name").map(str::to_owned).or_else(stem) else { continue };
@@ -161,10 +161,8 @@ impl<'a> Assets<'a> {
         with_mass: bool,
         say: &mut Vec<String>,
     ) -> Result<Geom<'a>, SimulateError> {
-        for name in item.names().into_iter().filter(|name| !KNOWN.contains(name)) {
-            say.push(left_out(&item, name));
-        }
-        let touch = touch(&item)?;
+        unknown(&item, &KNOWN, say);
+        let touch = touch(&item, self.compiler)?;
         let touches = touch.bits != [0, 0];
         let group = item.whole("group", 0)?;
         let groups = self.compiler.groups;
@@ -308,8 +306,11 @@ impl MeshAsset<'_> {
                 let faces = item.numbers("face")?.unwrap_or_default();
                 let (points, rest) = numbers.as_chunks::<3>();
                 let (corners, more) = faces.as_chunks::<3>();
-                if !rest.is_empty() || !more.is_empty() || faces.iter().any(|x| *x < 0.0) {
+                if !rest.is_empty() || !more.is_empty() {
                     return Err(item.wrong("three numbers of each vertex and face", "others"));
+                }
+                if let Some(x) = faces.iter().find(|x| **x < 0.0 || x.fract() != 0.0) {
+                    return Err(item.wrong("whole numbers of at least 0 as `face`", x));
                 }
                 let triangles: Vec<_> = corners.iter().map(|t| t.map(|x| x as usize)).collect();
                 (points.to_vec(), triangles)
@@ -330,8 +331,14 @@ impl MeshAsset<'_> {
     }
 }
 
+/// The name of a file without its folders.
+fn bare(file: &str) -> &str {
+    file.rsplit(['/', '\\']).next().unwrap_or(file)
+}
+
 /// Where a mesh is, from the folder of the model.
 fn path(compiler: &Compiler, file: &str) -> String {
+    let file = if compiler.strippath { bare(file) } else { file };
     let folder = match compiler.meshdir.as_str() {
         "" => compiler.assetdir.as_str(),
         folder => folder,
@@ -345,7 +352,7 @@ fn path(compiler: &Compiler, file: &str) -> String {
 /// MuJoCo's coefficients of friction where none are given: of sliding, and of turning and rolling, m.
 const FRICTION: [f64; 3] = [1.0, 5e-3, 1e-4];
 
-fn touch(item: &Item) -> Result<Touch, SimulateError> {
+fn touch(item: &Item, compiler: &Compiler) -> Result<Touch, SimulateError> {
     let bits = |name: &str| item.whole(name, 1).map(|x| x as u32);
     let [friction, _, rolling] = item.list("friction", FRICTION)?;
     if rolling < 0.0 {
@@ -354,6 +361,7 @@ fn touch(item: &Item) -> Result<Touch, SimulateError> {
     if friction < 0.0 {
         return Err(item.wrong("a `friction` of at least 0", friction));
     }
+    let [friction, rolling] = compiler.friction().unwrap_or([friction, rolling]);
     Ok(Touch {
         bits: [bits("contype")?, bits("conaffinity")?],
         friction,

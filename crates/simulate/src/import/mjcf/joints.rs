@@ -3,13 +3,54 @@
 use nonsmooth_scenes::vec3::{cross, dot, norm, sub};
 use serde_json::{Value, json};
 
-use super::compiler::{Compiler, left_out};
+use super::compiler::{Compiler, left_out, unknown};
 use super::document::{Defaults, Element, Item, MAIN};
 use super::model::{Joint, Kind, Tree};
 use crate::SimulateError;
 
 /// Directions and anchors are the same, or at right angles, up to this.
 const SAME: f64 = 1e-9;
+
+/// Attributes of motors and servos that are read, that they do not take over from defaults of other actuators, or that say what else than a joint they act on.
+const OF_ACTUATORS: [&str; 37] = [
+    "name",
+    "class",
+    "joint",
+    "group",
+    "user",
+    "ctrlrange",
+    "ctrllimited",
+    "forcerange",
+    "forcelimited",
+    "gear",
+    "kp",
+    "kv",
+    "dampratio",
+    "timeconst",
+    "inheritrange",
+    "gaintype",
+    "gainprm",
+    "biastype",
+    "biasprm",
+    "armature",
+    "damping",
+    "delay",
+    "nsample",
+    "interp",
+    "dyntype",
+    "dynprm",
+    "actdim",
+    "actearly",
+    "lengthrange",
+    "jointinparent",
+    "tendon",
+    "site",
+    "refsite",
+    "cranksite",
+    "cranklength",
+    "slidersite",
+    "body",
+];
 
 /// What a scene has of them.
 #[derive(Default)]
@@ -97,7 +138,7 @@ pub(super) fn read(
     let actuators = root.named("actuator").flat_map(|a| &a.children);
     for (k, element) in actuators.enumerate() {
         let control = controls.get(k).copied().unwrap_or(0.0);
-        rest.actuator(&defaults.item(element, MAIN)?, defaults, control)?;
+        rest.actuator(&defaults.item(element, MAIN)?, defaults, compiler, control)?;
     }
     let Rest { out, said, .. } = rest;
     tree.said.extend(said);
@@ -158,6 +199,11 @@ fn together(joints: &[Joint]) -> Option<Together> {
     }
 }
 
+/// Whether joints leave their body all six coordinates.
+pub(super) fn is_free(joints: &[Joint]) -> bool {
+    together(joints).is_some_and(|kind| kind.name == "free")
+}
+
 /// What the scene calls a body of the document in a joint.
 fn scene_name<'t>(tree: &'t Tree, body: usize) -> &'t str {
     match tree.carrier(body) {
@@ -174,9 +220,7 @@ fn drive(
 ) -> Result<[(&'static str, Value); 3], SimulateError> {
     let (item, start) = (&joint.item, joint.start);
     let unit = if joint.kind == Kind::Hinge { compiler.angle } else { 1.0 };
-    let range = item.some::<2>("range")?;
-    let limited = item.flag("limited", compiler.autolimits && range.is_some())?;
-    let limits = match range.filter(|_| limited) {
+    let limits = match item.range("range", "limited", compiler.autolimits)? {
         Some([lower, upper]) => {
             json!({"lower": unit * lower - start, "upper": unit * upper - start})
         }
@@ -211,13 +255,8 @@ fn drive(
 /// Says what acts along a joint that has no coordinate in a scene.
 fn undriven(joint: &Joint, said: &mut Vec<String>) {
     for name in ["range", "stiffness", "damping", "frictionloss", "armature"] {
-        let zero = |text: &str| text.split_whitespace().all(|x| x.parse() == Ok(0.0));
         // A free joint that is <freejoint> takes no defaults.
-        let there = match joint.item.element.tag.as_str() {
-            "freejoint" => None,
-            _ => joint.item.text(name),
-        };
-        if there.is_some_and(|text| !zero(text)) {
+        if joint.item.element.tag != "freejoint" && joint.item.acts(name) {
             said.push(left_out(&joint.item, name));
         }
     }
@@ -373,14 +412,37 @@ impl Rest<'_, '_> {
         &mut self,
         item: &Item,
         defaults: &Defaults,
+        compiler: &Compiler,
         control: f64,
     ) -> Result<(), SimulateError> {
         let kind = item.element.tag.as_str();
-        if !matches!(kind, "position" | "velocity") {
+        if compiler.disabled.contains(&item.whole("group", 0)?) {
+            self.said.push(format!("{}: left out: its group is disabled", item.key()));
+            return Ok(());
+        }
+        if !matches!(kind, "motor" | "position" | "velocity") {
             self.said.push(format!(
-                "{}: its control comes from outside, so it does nothing here: left out",
+                "{}: left out, with what it does without a control: motors of scenes are `position` and `velocity`",
                 item.key()
             ));
+            return Ok(());
+        }
+        unknown(item, &OF_ACTUATORS, &mut self.said);
+        let added = ["armature", "damping", "delay"].into_iter().filter(|name| item.acts(name));
+        self.said.extend(added.map(|name| left_out(item, name)));
+        let range = item.range("ctrlrange", "ctrllimited", compiler.autolimits)?;
+        let control = match range.filter(|_| compiler.clamps) {
+            Some([lower, upper]) => control.clamp(lower, upper),
+            None => control,
+        };
+        if kind == "motor" {
+            self.said.push(match control {
+                0.0 => format!(
+                    "{}: its control comes from outside, so it does nothing here: left out",
+                    item.key()
+                ),
+                _ => format!("{}: left out, with its control of {control}", item.key()),
+            });
             return Ok(());
         }
         let known = item.text("joint");
@@ -391,12 +453,6 @@ impl Rest<'_, '_> {
         };
         let servo = defaults.servo(item.element)?;
         self.said.extend(servo.left_out().map(|what| format!("{}: {what}", item.key())));
-        let range = item.some::<2>("ctrlrange")?;
-        let limited = item.flag("ctrllimited", range.is_some())?;
-        let control = match range.filter(|_| limited) {
-            Some([lower, upper]) if lower <= upper => control.clamp(lower, upper),
-            _ => control,
-        };
         let [gear, ..] = item.list("gear", [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])?;
         let mut motor = match kind {
             "position" => json!({
@@ -415,9 +471,8 @@ impl Rest<'_, '_> {
         if gear == 0.0 {
             return Err(item.wrong("a `gear` that is not 0", gear));
         }
-        let force = item.some::<2>("forcerange")?;
-        if let Some([lower, upper]) = force
-            && item.flag("forcelimited", true)?
+        if let Some([lower, upper]) =
+            item.range("forcerange", "forcelimited", compiler.autolimits)?
         {
             if lower != -upper {
                 self.said.push(format!(

@@ -46,7 +46,7 @@ pub fn mjcf(text: &str, folder: &Path) -> Result<Imported, SimulateError> {
     let assets = Assets::read(&root, &defaults, &compiler)?;
     let mut tree = Tree::read(&root, &defaults, &compiler, &assets, said)?;
     let controls = keyframe(&root, &defaults, &mut tree)?;
-    let contacts = Contacts::read(&root, &defaults, &mut tree)?;
+    let contacts = Contacts::read(&root, &defaults, &compiler, &mut tree)?;
     let mut bodies = vec![];
     for k in 0..tree.bodies.len() {
         if lifts_unevenly(&tree, k)? {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nonsmooth_scenes::vec3::{Mat3, Vec3, add, norm, scale, sub};
 use nonsmooth_scenes::{MassProperties, Rotation};
 
-use super::compiler::{Compiler, left_out};
+use super::compiler::{Compiler, unknown};
 use super::document::{Defaults, Element, Item, MAIN};
 use super::geoms::{Assets, Geom};
 use crate::SimulateError;
@@ -65,7 +65,7 @@ impl Kind {
     }
 }
 
-/// Attributes of bodies, joints and inertials that are read, or that change no motion.
+/// Attributes of bodies, frames, inertials and joints that are read, or that change no motion.
 const OF_BODIES: [&str; 13] = [
     "name",
     "class",
@@ -81,6 +81,10 @@ const OF_BODIES: [&str; 13] = [
     "user",
     "sleep",
 ];
+const OF_FRAMES: [&str; 8] =
+    ["name", "childclass", "pos", "quat", "axisangle", "xyaxes", "zaxis", "euler"];
+const OF_INERTIALS: [&str; 9] =
+    ["pos", "quat", "axisangle", "xyaxes", "zaxis", "euler", "mass", "diaginertia", "fullinertia"];
 const OF_JOINTS: [&str; 20] = [
     "name",
     "class",
@@ -183,6 +187,7 @@ impl<'a> Tree<'a> {
             match child.tag.as_str() {
                 "body" => self.body(reader, item, place)?,
                 "frame" => {
+                    unknown(&item, &OF_FRAMES, &mut self.said);
                     let class = child.attributes.get("childclass").unwrap_or(&place.class);
                     let frame = place.frame.then(&reader.compiler.frame(&item)?);
                     let inner = Place { frame, class: class.clone(), ..*place };
@@ -197,6 +202,7 @@ impl<'a> Tree<'a> {
                 }
                 "joint" | "freejoint" => self.joint(reader, item, place)?,
                 "inertial" => {
+                    unknown(&item, &OF_INERTIALS, &mut self.said);
                     let own = place.frame.mass(&own_mass(&item, reader.compiler)?);
                     self.bodies[place.body].stated = Some(own);
                 }
@@ -218,7 +224,7 @@ impl<'a> Tree<'a> {
         item: Item<'a>,
         place: &Place,
     ) -> Result<(), SimulateError> {
-        self.unknown(&item, &OF_BODIES);
+        unknown(&item, &OF_BODIES, &mut self.said);
         let number = self.bodies.len();
         let name = item.element.attributes.get("name");
         let name = self.fresh(name.cloned().unwrap_or_else(|| format!("body {number}")));
@@ -256,7 +262,7 @@ impl<'a> Tree<'a> {
         if place.body == 0 {
             return Err(item.wrong("a joint of a body", "one of the world"));
         }
-        self.unknown(&item, &OF_JOINTS);
+        unknown(&item, &OF_JOINTS, &mut self.said);
         let kind = match (item.element.tag.as_str(), item.text("type").unwrap_or("hinge")) {
             ("freejoint", _) | (_, "free") => Kind::Free,
             (_, "ball") => Kind::Ball,
@@ -299,11 +305,6 @@ impl<'a> Tree<'a> {
             direction: [0.0; 3],
         });
         Ok(())
-    }
-
-    fn unknown(&mut self, item: &Item, known: &[&str]) {
-        let names = item.names().into_iter().filter(|name| !known.contains(name));
-        self.said.extend(names.map(|name| left_out(item, name)));
     }
 
     /// Puts all bodies where the coordinates `q` say, or else where their joints are at their reference; those that are `led` where they are led.

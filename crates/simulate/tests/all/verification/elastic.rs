@@ -211,3 +211,63 @@ fn a_limit_while_solids_are_prepared_is_no_loss_of_numbers() {
     flag.store(false, Ordering::Relaxed);
     assert_eq!(cube.step(1e-3).unwrap().status, StepStatus::Solved);
 }
+
+/// What moves far and strains nothing feels no spring back to where it began, and keeps its momentum however stiff it is for the step.
+#[test]
+fn a_stiff_box_that_flies_far_keeps_its_velocity_and_energy() {
+    for h in [1e-2, 1e-3] {
+        let scene = scene(&format!(
+            "gravity = [0, 0, -9.81]
+             time = {{ h = {h}, end = 2 }}
+             pairs_default = {{}}
+             [[elastic]]
+             half = [0.001, 0.001, 0.001]
+             divisions = [4, 4, 4]
+             young = 2.1e11
+             poisson = 0.3
+             density = 7800
+             velocity = [1, 0, 0]"
+        ));
+        let mut cube = scene.build().unwrap();
+        let mut worst = 0.0_f64;
+        let mut watch = |_: &Simulation, r: &StepReport| {
+            let t = r.t;
+            let kinetic = 0.5 * 7800.0 * 8e-9 * (1.0 + (9.81 * t).powi(2));
+            worst = worst.max((r.energy.kinetic / kinetic - 1.0).abs());
+            Control::Continue
+        };
+        let run = cube.run(scene.time.end, scene.time.h, &mut watch).unwrap();
+        assert!(run.is_solved() && run.imbalance <= 1e-10, "{run}");
+        assert!(worst < 1e-9, "h = {h}: {worst:e}");
+        let state = &cube.state().elastic[0];
+        for (v, x) in state.velocity.iter().zip(&state.displacement) {
+            near(v[0], 1.0, 1e-9);
+            near(v[2], -19.62, 1e-8);
+            near(x[0], 2.0, 1e-9);
+            near(x[1], 0.0, 1e-9);
+        }
+    }
+}
+
+/// Damping by mass slows down what moves as a whole, by stiffness it does not.
+#[test]
+fn damping_by_mass_is_that_of_the_whole() {
+    let (alpha, h) = (0.5_f64, 1e-2_f64);
+    let scene = scene(&format!(
+        "gravity = [0, 0, 0]
+         time = {{ h = {h}, end = 1 }}
+         pairs_default = {{}}
+         [[elastic]]
+         half = [0.1, 0.2, 0.1]
+         divisions = [2, 4, 2]
+         young = 1e9
+         density = 1000
+         damping = {{ mass = {alpha}, stiffness = 1e-3 }}
+         velocity = [0, 3, 0]"
+    ));
+    let mut block = scene.build().unwrap();
+    block.run(scene.time.end, scene.time.h, &mut ()).unwrap();
+    // θ = 1/2.
+    let step = (1.0 - 0.5 * h * alpha) / (1.0 + 0.5 * h * alpha);
+    block.state().elastic[0].velocity.iter().for_each(|v| near(v[1], 3.0 * step.powi(100), 1e-10));
+}

@@ -37,7 +37,7 @@ pub struct Hyperplane {
     pub accept: f64,
     /// Lengthen the next prediction after a ratio below this, in (0, accept).
     pub grow_below: f64,
-    /// The factor by which a prediction's step is shortened, in (0, 1); its inverse lengthens.
+    /// The factor by which a prediction's step is shortened, in (0, 0.99); its inverse lengthens.
     pub shrink: f64,
     /// Steps between two evaluations of the true residual, unless the estimate asks for one earlier.
     pub check_every: usize,

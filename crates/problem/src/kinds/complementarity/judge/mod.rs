@@ -113,6 +113,11 @@ impl Pair {
         }
     }
 
+    /// Whether w is excused by the nearness of the bound that its sign asks for.
+    pub(crate) fn is_excused(&self) -> bool {
+        self.dual().max(self.complementarity()) < self.error
+    }
+
     pub(crate) fn worst(&self) -> f64 {
         worse(worse(self.primal(), self.dual()), self.complementarity())
     }

@@ -18,6 +18,10 @@ const FAR: [f64; 2] = [(1_u64 << 40) as f64, (1_u64 << 50) as f64];
 /// that fall by less than this from one point to the next. So near to zero, in powers of two, and so far.
 const LEVEL: f64 = 0.9;
 const STEPS: i32 = 60;
+/// Near zero, and far off, rows are sums of powers of which one is left: sizes whose ratio from one step to the next has changed by less than this follow it, and at the start it alone makes a unit.
+const SETTLED: f64 = 1e-3;
+/// A row with a constant leaves its level where it is so many times that: so large are the variables that it ties.
+const LEAVES: f64 = 2.0;
 /// Then in longer steps, down to the smallest numbers and up to the largest, of which the last two are near each other; where a size rises along one of them, in short ones again.
 const LONGER_STEPS: [i32; 9] = [64, 72, 88, 120, 184, 312, 568, 1016, 1020];
 /// Where F ends on the way, so many points halve the way to there.
@@ -157,6 +161,37 @@ fn note_level(least: &mut [f64], before: &[f64], now: &[f64]) {
             *least = least.min(now.max(*before));
         }
     }
+}
+
+/// What the last power of sizes that fall, one list for each short step, makes of them at the start.
+fn extrapolate(least: &mut [f64], steps: &[Vec<f64>]) {
+    let [.., first, before, now] = steps else { return };
+    for (i, least) in least.iter_mut().enumerate() {
+        let (earlier, ratio) = (first[i] / before[i], before[i] / now[i]);
+        let falls = ratio.is_finite() && ratio > 1.0 / LEVEL;
+        if falls && (earlier / ratio - 1.0).abs() <= SETTLED {
+            let there = now[i] * ratio.powi(steps.len() as i32);
+            *least = if there > 0.0 { least.min(there) } else { *least };
+        }
+    }
+}
+
+/// The part of the start that each variable keeps where rows with constants, which tie it, have about the size of these; all where none does.
+fn natural(pattern: &Pattern, whole: &[f64], steps: &[Vec<f64>]) -> Vec<f64> {
+    let n = whole.len() - 1;
+    let mut parts = vec![0.0_f64; n];
+    if let [.., before, now] = steps {
+        for i in (0..n).filter(|&i| now[i] > 0.0 && now[i] >= LEVEL * before[i]) {
+            let is_level = |sizes: &[f64]| sizes[i] <= LEAVES * now[i];
+            // The last step before it is.
+            let left =
+                if is_level(whole) { Some(0) } else { steps.iter().position(|s| is_level(s)) };
+            let part = left.map_or(0.0, |k| 4.0_f64.powi(-(k as i32)));
+            pattern.row(i).iter().for_each(|&j| parts[j] = parts[j].max(part));
+        }
+    }
+    parts.iter_mut().filter(|part| **part == 0.0).for_each(|part| *part = 1.0);
+    parts
 }
 
 /// `Σ_j of(J_ij d_j)`
@@ -301,6 +336,7 @@ impl Units {
             };
             let short = (1..=STEPS / 2).map(|k| 2 * k);
             let (mut last, mut edge) = (0, None);
+            let mut steps: Vec<Vec<f64>> = vec![];
             for k in short.chain(LONGER_STEPS) {
                 let Some(now) = sizes_at(k, 1.0) else {
                     edge = Some((last, f64::from(last - k).exp2()));
@@ -318,6 +354,9 @@ impl Units {
                     note_level(&mut least, &before, &now);
                     before = now;
                 }
+                if k <= STEPS {
+                    steps.push(before.clone());
+                }
                 last = k;
             }
             // F ends there: sizes may be level at the edge of where it is defined.
@@ -332,6 +371,21 @@ impl Units {
                         true
                     })
                 });
+            }
+            // All short ones.
+            if steps.len() == STEPS as usize / 2 {
+                extrapolate(&mut least, &steps);
+                let parts = natural(field.pattern(), &whole, &steps);
+                if inwards && parts.iter().any(|part| *part < 1.0) {
+                    let way = from.iter().zip(start).zip(&parts);
+                    let point: Vec<f64> = way.map(|((z, s), part)| z + part * (s - z)).collect();
+                    over |= budget::over();
+                    let look = || terms.look(field.pattern(), &point, !self.expressions);
+                    if !over && tentatively(look) {
+                        let sizes = least.iter_mut().zip(&terms.sizes);
+                        sizes.filter(|s| *s.1 > 0.0).for_each(|(least, d)| *least = least.min(*d));
+                    }
+                }
             }
         }
         // These are no sizes of the point last looked at any more.

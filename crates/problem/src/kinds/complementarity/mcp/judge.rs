@@ -14,7 +14,7 @@ use crate::field::tentatively;
 /// The error of row i is `|F_i| / D_i` (0/0 = 0), where D_i is the size of the row's terms at x: of a polynomial the sum of the moduli of its monomials, of
 /// other expressions the same to first order, of functions without expressions `|F_i − Σ_j J_ij x_j| + Σ_j |J_ij x_j|` (where F does not change as J says, `|F_i|` and its change along a vector of the size of x, if that is smaller); of rows that vanish with all their terms at least
 /// a ten-thousandth of ω_i, the size at the start or, where that is zero, what a change of the other rows by their own ω makes of the row through the variables that they share, as far as those reach (the smaller modulus of a variable's bounds that is not zero) and no more than the other rows' sizes at x make of it; or
-/// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller; where a row is smaller than that ten-thousandth, also the size on the way to these points where it no longer falls, if that is a smaller
+/// the size at the point nearest to zero that the bounds allow, or far beyond the start, if that is smaller; where a row is smaller than that ten-thousandth, also the size on the way to these points where it no longer falls, what its last power there makes of it at the start, or the size where the variables are as large as rows with a constant tie them, if that is a smaller
 /// part: a start far off, or near a pole at zero, makes nothing small. Of a row that along a change of x by a
 /// thousandth does not change as J says, that change counts in place of the terms that it should have had. That a variable is d away from a bound
 /// counts as much as what it does to the rows, `max_k |J_kj| d / D_k`; where the Jacobian does not see it, d over the largest of `|x_j|`, `|start_j|` and the modulus of
@@ -120,8 +120,6 @@ impl McpGauge {
             ..Measure::never()
         };
         let mut own: f64 = 0.0;
-        let mut bounded = std::mem::take(&mut self.bounded);
-        bounded.clone_from(x);
         for i in 0..x.len() {
             let pair = self.pair(problem, x, i);
             let residual = natural(x[i], pair.w, pair.l, pair.u).abs();
@@ -133,16 +131,12 @@ impl McpGauge {
             if worst > measure.worst || worst.is_nan() {
                 (measure.worst_contact, measure.worst) = (i, worst);
             }
-            // The error of F, where that is the error of the pair.
-            let of_f = pair.dual().max(pair.complementarity());
-            bounded[i] = if of_f < pair.error { pair.towards() } else { x[i] };
-            bounded[i] = bounded[i].max(pair.l).min(pair.u);
             let (unit, near) = self.units.at(i, self.terms.sizes[i]);
             if unit.is_nan() || unit <= 0.0 {
                 continue;
             }
             let mut share_of_own = share(pair.w, unit);
-            if of_f < pair.error {
+            if pair.is_excused() {
                 // Nor is a distance none for a derivative that hardly feels it, where F is as large as it was: on the bound F may be another.
                 let length = unit_of(self.lengths[i], pair.towards());
                 let way = (pair.z - pair.towards()).abs() / length;
@@ -159,13 +153,12 @@ impl McpGauge {
         }
         measure.floor = precisely.then(|| self.floor(problem, x));
         let passes = [measure.primal, measure.dual, measure.complementarity];
-        if precisely && bounded != *x && passes.into_iter().all(|error| error <= LOOSEST) {
-            let (there, worst) = self.at_bounds(problem, x, &bounded);
+        if precisely && passes.into_iter().all(|error| error <= LOOSEST) {
+            let (there, worst) = self.at_bounds(problem, x);
             if there > own {
                 (own, measure.own_contact) = (there, Some(worst));
             }
         }
-        self.bounded = bounded;
         // What is not known cannot be held against the point, nor the point be accepted without it.
         measure.own = Some(if precisely && self.units.cut_short { NEVER } else { own });
         measure.relative = worse(worse(measure.primal, measure.dual), measure.complementarity);
@@ -173,9 +166,22 @@ impl McpGauge {
         measure
     }
 
-    /// The largest error at the point y with variables of x on their bounds, or distance from x by what it does there, and its row: where F hardly feels a distance, as in the flat
-    /// tail of an exponential, it may yet be another on the bound. Nothing where F is not defined there.
-    fn at_bounds(&mut self, problem: &Mcp, x: &[f64], y: &[f64]) -> (f64, usize) {
+    /// The largest error at the point y, x with the variables on their bounds whose nearness excuses their rows, or distance of y from x by what it does there, and its row: where F
+    /// hardly feels a distance, as in the flat tail of an exponential, it may yet be another on the bound. Nothing where F is not defined there, or y is x, the point last looked at.
+    fn at_bounds(&mut self, problem: &Mcp, x: &[f64]) -> (f64, usize) {
+        let mut y = std::mem::take(&mut self.bounded);
+        for (i, y) in y.iter_mut().enumerate() {
+            let pair = self.pair(problem, x, i);
+            let at = if pair.is_excused() { pair.towards() } else { x[i] };
+            *y = at.max(pair.l).min(pair.u);
+        }
+        let worst = if y == x { (0.0, 0) } else { self.instead(problem, x, &y) };
+        self.bounded = y;
+        worst
+    }
+
+    /// What [`at_bounds`](Self::at_bounds) finds at y; looks at x again.
+    fn instead(&mut self, problem: &Mcp, x: &[f64], y: &[f64]) -> (f64, usize) {
         let mut worst = (0.0, 0);
         if tentatively(|| self.look(problem, y, true)) {
             for i in 0..y.len() {

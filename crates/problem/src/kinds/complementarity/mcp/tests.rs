@@ -340,6 +340,46 @@ fn where_f_ends_no_error_is_small() {
     assert!(problem.judge(&LcpPoint { z: vec![1.0 + 1e-6] }, 1e-8).unwrap().solved);
 }
 
+/// Rows that vanish with all their terms at zero, or far off, have the unit that their last power makes at the start, or that the variables have where other rows tie them: not
+/// what larger powers, or an exponential, make at a start far off.
+#[test]
+fn larger_powers_at_a_start_far_off_make_no_error_small() {
+    let inf = f64::INFINITY;
+    let judged = |f: &[&str], lower: f64, start: &[f64], z: &[f64]| {
+        let f: Vec<String> = f.iter().map(|f| f.to_string()).collect();
+        let n = start.len();
+        let field = Expressions::parse(&f, &[]).unwrap();
+        let problem = Mcp::new(field, vec![lower; n], vec![inf; n], start.to_vec()).unwrap();
+        problem.judge(&LcpPoint { z: z.to_vec() }, 1e-8).unwrap().solved
+    };
+    type Case<'a> = (&'a [&'a str], f64, &'a [f64], &'a [f64]);
+    let wrong: [Case; 8] = [
+        (&["x1*exp(x1^2)"], -inf, &[10.0], &[6.94]),
+        (&["x1*exp(x1)"], -inf, &[50.0], &[1.03]),
+        (&["x1^9 + x1"], -inf, &[100.0], &[3.0]),
+        (&["x1^5 + x1"], -inf, &[1000.0], &[3.0]),
+        (&["x1^3 + x1"], -inf, &[1e6], &[50.0]),
+        (&["x1*cosh(x1) + x2", "x2 - x1"], -inf, &[60.0, 3.0], &[3.0, 3.0]),
+        (&["x1^2*x2 - x2^2", "x1 + x2 - 5"], -inf, &[1e9, 1e9], &[-89.1, 94.1]),
+        (&["6/x1^7 - 12/x1^13"], 0.01, &[0.1], &[0.907]),
+    ];
+    for (f, lower, start, z) in wrong {
+        assert!(!judged(f, lower, start, z), "{f:?} at {z:?}");
+    }
+    let right: [Case; 6] = [
+        (&["x1*exp(x1^2)"], -inf, &[10.0], &[1e-13]),
+        (&["x1^9 + x1"], -inf, &[100.0], &[1e-11]),
+        // Of one power alone nobody knows the unit but the start.
+        (&["x1^3"], -inf, &[1e6], &[1.0]),
+        (&["x1^2*x2 - x2^2", "x1 + x2 - 5"], -inf, &[1e9, 1e9], &[5.0, 0.0]),
+        (&["x1^2*x2 - x2^2", "x1 + x2 - 5"], -inf, &[1e9, 1e9], &[5.0, 1e-13]),
+        (&["6/x1^7 - 12/x1^13"], 0.01, &[0.1], &[2.0_f64.powf(1.0 / 6.0)]),
+    ];
+    for (f, lower, start, z) in right {
+        assert!(judged(f, lower, start, z), "{f:?} at {z:?}");
+    }
+}
+
 #[test]
 fn a_point_is_asked_once() {
     use std::sync::Arc;

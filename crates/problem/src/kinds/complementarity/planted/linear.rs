@@ -148,21 +148,25 @@ impl PlantedLcp {
         (problem, LcpPoint { z })
     }
 
+    /// The fewest variables of a problem without a solution.
+    pub const LEAST_INFEASIBLE: usize = 6;
+
     /// An LCP without a solution, and a Farkas vector that proves it. `None` of a class in which every problem, or every feasible one, is
-    /// solvable: all but `Psd`, `Kkt` and `CopositivePlus`.
+    /// solvable: all but `Psd`, `Kkt` and `CopositivePlus`. Fewer than [`LEAST_INFEASIBLE`](Self::LEAST_INFEASIBLE) variables are as many. What proves it vanishes with M to the last
+    /// bit, while n is below a thousand: the entries that it meets are of few bits.
     pub fn infeasible(&self) -> Option<(Lcp, Certificate)> {
         use PlantedClass::{CopositivePlus, Kkt, Psd};
         if !matches!(self.class, Psd | Kkt | CopositivePlus) {
             return None;
         }
         let mut rng = Pcg64::seed_from_u64(self.seed);
-        let n = self.rows().max(6);
+        let n = self.rows().max(Self::LEAST_INFEASIBLE);
         let pairs = self.pairs(n, &mut rng);
         // A vector y ≥ 0 on a few rows, with yᵀ M = 0.
         let first = self.farkas_rows(n);
         let mut y = vec![0.0; n];
         for k in first.clone() {
-            y[k] = f64::from(rng.random_range(1..4_u8));
+            y[k] = f64::from(rng.random_range(1..3_u8));
         }
         let entries = self.entries(n, Some(&y), &mut rng);
         let (row, column) = self.scales(n, &mut rng);
@@ -452,7 +456,10 @@ impl PlantedLcp {
             rows.sort_unstable();
             rows.dedup();
             for i in rows {
-                let x = size * rng.random_range(-1.0..1.0);
+                let mut x = size * rng.random_range(-1.0..1.0);
+                if y.is_some() {
+                    x = (x * FEW_BITS).round() / FEW_BITS;
+                }
                 column.extend(copies[i].iter().map(|&k| (k, x)));
             }
             if let Some(y) = y {
@@ -573,7 +580,10 @@ fn repeated(n: usize, rng: &mut Pcg64) -> Vec<usize> {
     (0..n).map(|i| if i < first { i } else { rng.random_range(0..first) }).collect()
 }
 
-/// Changes the column so that its product with y vanishes.
+/// Products of numbers of so few bits below one, and sums of a thousand of them, are exact.
+const FEW_BITS: f64 = (1 << 18) as f64;
+
+/// Changes the column so that its product with y, of ones and twos, vanishes.
 fn cancel(column: &mut Vec<(usize, f64)>, y: &[f64]) {
     let sum: f64 = column.iter().map(|&(i, x)| y[i] * x).sum();
     match column.iter().filter(|e| y[e.0] > 0.0).count() {
