@@ -15,7 +15,7 @@ use nonsmooth_scenes::Rotation;
 use nonsmooth_scenes::vec3::{Vec3, add, apply, dot, norm, scale};
 
 use super::equations::Equation;
-use super::rows::Joints;
+use super::rows::{Joints, is_limit};
 use crate::rotation::{apply_transposed, cayley, inverse, unit};
 use crate::state::State;
 use crate::{BodyId, MoreauJean, Motion, Stabilisation, World};
@@ -26,6 +26,8 @@ const ITERATIONS: usize = 8;
 
 /// A rate beyond this share of its terms is more than rounding.
 const FITS: f64 = 1e-9;
+/// Where velocities drift, one beyond this share is what an impact has left.
+const STOPPED: f64 = 0.05;
 
 /// Of a body and a row: force, moment, and what these make of the body.
 type Effect = (u32, usize, Vec3, Vec3, Vec3, Vec3);
@@ -71,6 +73,13 @@ fn rate(world: &World, state: &State, equation: &Equation) -> (f64, f64) {
         let (slide, turn) = (dot(r.force, v), dot(r.moment, omega));
         (rate + slide + turn, terms + norm(r.force) * norm(v) + norm(r.moment) * norm(omega))
     })
+}
+
+/// Whether something pushed in the last step that may have stopped what moved: a contact, or the end of a coordinate.
+fn has_stopped(state: &State) -> bool {
+    let memory = &state.memory;
+    memory.contacts.iter().any(|contact| contact.impulse != [0.0; 3])
+        || memory.impulses.iter().any(|((_, row), x)| *x != 0.0 && is_limit(*row))
 }
 
 impl Joints {
@@ -131,19 +140,20 @@ impl Joints {
         change
     }
 
-    /// Finds velocities that fit the joints, where those at the beginning of a step do not: before the first step, or because they were set.
+    /// Finds velocities that fit the joints, where those at the beginning of a step do not: before the first step, because they were set, or, where nothing projects them, after an impact.
     pub fn fit(&mut self, scheme: &MoreauJean, world: &World, state: &State) {
         self.fitted = None;
         // Velocities that are not projected drift; to make them fit again and again would bring energy or take it.
         let drifts = scheme.stabilisation == Stabilisation::None && state.steps > 0;
-        if self.is_empty() || drifts {
+        if self.is_empty() || drifts && !has_stopped(state) {
             return;
         }
+        let least = if drifts { STOPPED } else { FITS };
         let equations = self.equations(world, state, |k| state.pose(k as usize));
         let rates: Vec<_> = equations.iter().map(|(_, e)| rate(world, state, e)).collect();
         let largest = rates.iter().fold(0.0_f64, |most, r| most.max(r.1));
         let fits =
-            |(rate, terms): (f64, f64)| rate.abs() <= f64::max(FITS * terms, ROUNDING * largest);
+            |(rate, terms): (f64, f64)| rate.abs() <= f64::max(least * terms, ROUNDING * largest);
         if !rates.into_iter().all(fits) {
             let mut fitted = state.clone();
             self.project_velocities(world, &mut fitted);

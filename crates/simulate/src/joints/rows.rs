@@ -77,6 +77,11 @@ pub(crate) struct Joints {
     pub redundant: Option<(usize, usize)>,
 }
 
+/// Whether the row of this number is the end of a coordinate.
+pub(super) fn is_limit(number: u32) -> bool {
+    number.checked_sub(EQUATIONS).is_some_and(|along| [LOWER, UPPER].contains(&(along % 8)))
+}
+
 /// The number of a row that acts along a coordinate, after those of the equations.
 fn number(drive: usize, what: u32) -> u32 {
     EQUATIONS + 8 * drive as u32 + what

@@ -569,8 +569,8 @@ impl Parts<'_> {
         let (n, p) = (D * sides.len(), scalars.len());
         let V = Csc::from_triplets(n, p, v.into_iter()).expect("in range");
         let R = Csc::from_triplets(p, p, r.into_iter()).expect("in range");
-        if joints.redundant.is_some() && finite {
-            agree(&R, &bounds, &mut s, &sizes);
+        if finite {
+            agree(&R, &bounds, (&mut s, &sizes), joints.redundant.is_some());
         }
         problem.rows = Some(RowsLocal { V, R, s, bounds });
         finite
@@ -718,8 +718,11 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Bodies that move together have no relative velocity: what rounding leaves of one would be a load of its own, to be borne to the last digit.
 fn unrounded(velocity: f64, rounding: f64) -> f64 {
-    if velocity.abs() <= rounding { 0.0 } else { velocity }
+    if velocity.abs() <= rounding.max(DECAYED) { 0.0 } else { velocity }
 }
+
+/// What is left of a velocity that has decayed to where doubles have no digits any more, m/s.
+const DECAYED: f64 = 1e-290;
 
 /// What is not known of the rate of an equation at poses that are closed to rounding, in parts of its terms.
 const CLOSED: f64 = 128.0 * f64::EPSILON;
@@ -728,11 +731,10 @@ const KNOWN: f64 = 1e-11;
 /// What is added to the diagonal of R so that it can be factorised, in parts of it.
 const REGULAR: f64 = 1e-12;
 
-/// Equations that follow from the others agree with them but for rounding, and no impulse bears the difference: it is taken out of the loads `s`. Where all of them are
-/// rounding there is no load; where it counts, those of the free rows become `R κ`, which impulses can answer, if none moves by more than is not known of it.
+/// Loads `s` that are all rounding are none. Equations that follow from the others (`redundant`) agree with them but for rounding, and no impulse bears the difference: where it counts, the loads of the free rows become `R κ`, which impulses can answer, if none moves by more than is not known of it.
 /// The velocities of bodies carry their rounding from row to row, in units of √R_jj.
 #[allow(non_snake_case)]
-fn agree(R: &Csc, bounds: &Bounds, s: &mut [f64], terms: &[f64]) {
+fn agree(R: &Csc, bounds: &Bounds, (s, terms): (&mut [f64], &[f64]), redundant: bool) {
     let unit: Vec<f64> = (0..s.len()).map(|j| R.get(j, j).sqrt()).collect();
     let most = |x: &[f64]| {
         let each = x.iter().zip(&unit).filter(|e| *e.1 > 0.0);
@@ -742,7 +744,7 @@ fn agree(R: &Csc, bounds: &Bounds, s: &mut [f64], terms: &[f64]) {
     if load <= ROUNDING * size {
         s.fill(0.0);
     }
-    if load <= ROUNDING * size || ROUNDING * size <= KNOWN * load {
+    if load <= ROUNDING * size || ROUNDING * size <= KNOWN * load || !redundant {
         return;
     }
     let free: Vec<usize> = (0..s.len()).filter(|&j| bounds.is_free(j)).collect();

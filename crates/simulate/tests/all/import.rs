@@ -130,7 +130,7 @@ fn a_root_without_mass_that_is_called_world_stands_with_what_is_fixed_to_it() {
         let scene: toml::Table = toml::from_str(&made.scene).unwrap();
         let first = &scene["bodies"][0];
         assert_eq!(first.get("fixed").is_some(), fixed, "{first:?}");
-        assert!(made.warnings.is_empty(), "{:?}", made.warnings);
+        assert!(!made.warnings.iter().any(|w| w.contains("root")), "{:?}", made.warnings);
         let to = if bodies == 1 { "world" } else { "world_link" };
         assert_eq!(scene["joints"][0]["a"].as_str(), Some(to));
         if fixed {
@@ -146,7 +146,7 @@ fn a_root_without_mass_that_is_called_world_stands_with_what_is_fixed_to_it() {
     let scene: toml::Table = toml::from_str(&vehicle.scene).unwrap();
     assert!(scene["bodies"][0].get("fixed").is_none() && scene["bodies"][0].get("mass").is_some());
     let said = "link `base_footprint`: a root without mass moves with what is fixed to it, as `base_link`; one called `world` would stand";
-    assert_eq!(vehicle.warnings, [said]);
+    assert!(vehicle.warnings.iter().any(|w| w == said), "{:?}", vehicle.warnings);
 }
 
 #[test]

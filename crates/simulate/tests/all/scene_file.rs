@@ -732,6 +732,7 @@ fn axes_stay_with_the_partner_that_they_are_of() {
             r#"
             format = "nonsmooth-scene"
             version = 1
+            time = {{ h = 1e-3, end = 0.1 }}
             bodies = [{{ name = "arm", mass = 1, inertia = [1, 1, 1] }}]
             joints = [{{ {joint} }}]
             "#

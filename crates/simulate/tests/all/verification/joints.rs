@@ -610,3 +610,32 @@ fn mistakes_in_joints_are_named() {
     let said = built(Joint { a: Some(b), ..hinge() });
     assert!(said.contains("another body than a"), "{said}");
 }
+
+/// A lever falls onto the floor and comes to rest: what the impact has left of its velocity against the joint, where nothing projects it, is not thrown back for ever.
+#[test]
+fn a_lever_that_has_hit_the_floor_rests() {
+    let text = r#"
+        format = "nonsmooth-scene"
+        version = 1
+        time = { h = 1e-3, end = 1 }
+        pairs_default = { mu = 0.5 }
+        integrator = { stabilisation = "none" }
+        bodies = [
+            { name = "lever", shape = { kind = "box", half = [0.25, 0.02, 0.02] }, density = 1000, position = [0.25, 0, 0] },
+            { name = "floor", shape = { kind = "plane" }, fixed = true, position = [0, 0, -0.15] },
+        ]
+        joints = [{ kind = "revolute", a = "world", b = "lever", axis = [0, 1, 0], collide = true }]
+    "#;
+    let mut lever = nonsmooth_simulate::SceneFile::parse(text, &[]).unwrap().build().unwrap();
+    let run = lever.run(1.0, 1e-3, &mut ()).unwrap();
+    assert!(run.is_solved(), "{run}");
+    let mut last = 0.0;
+    for _ in 0..4 {
+        lever.run(lever.state().t + 1e-3, 1e-3, &mut ()).unwrap();
+        let force = lever.joints()[0].impulse[2] / 1e-3;
+        assert!(last == 0.0 || (force - last).abs() < 1e-6, "{force} {last}");
+        last = force;
+        let v = lever.state().velocity[0].iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        assert!(v < 1e-9, "{v:e}");
+    }
+}

@@ -18,9 +18,9 @@ const FAR: [f64; 2] = [(1_u64 << 40) as f64, (1_u64 << 50) as f64];
 /// that fall by less than this from one point to the next. So near to zero, in powers of two, and so far.
 const LEVEL: f64 = 0.9;
 const STEPS: i32 = 60;
-/// Near zero, and far off, rows are sums of powers of which one is left: sizes whose ratio from one step to the next has changed by less than this follow it, and at the start it alone makes a unit.
+/// Near zero, and far off, rows are sums of powers of which one is left: sizes whose ratio from one step to the next has changed by less than this follow it.
 const SETTLED: f64 = 1e-3;
-/// A row with a constant leaves its level where it is so many times that: so large are the variables that it ties.
+/// A row leaves its last power, or its level where it has a constant, where it is so many times that: there the next power is as large, and the variables as the row ties them.
 const LEAVES: f64 = 2.0;
 /// Then in longer steps, down to the smallest numbers and up to the largest, of which the last two are near each other; where a size rises along one of them, in short ones again.
 const LONGER_STEPS: [i32; 9] = [64, 72, 88, 120, 184, 312, 568, 1016, 1020];
@@ -163,35 +163,38 @@ fn note_level(least: &mut [f64], before: &[f64], now: &[f64]) {
     }
 }
 
-/// What the last power of sizes that fall, one list for each short step, makes of them at the start.
-fn extrapolate(least: &mut [f64], steps: &[Vec<f64>]) {
+/// Of sizes that fall, one list for each short step, what the last power of a row makes of it where it leaves that, or, where it never does, at the start.
+fn note_last_power(least: &mut [f64], whole: &[f64], steps: &[Vec<f64>]) {
     let [.., first, before, now] = steps else { return };
     for (i, least) in least.iter_mut().enumerate() {
         let (earlier, ratio) = (first[i] / before[i], before[i] / now[i]);
         let falls = ratio.is_finite() && ratio > 1.0 / LEVEL;
-        if falls && (earlier / ratio - 1.0).abs() <= SETTLED {
-            let there = now[i] * ratio.powi(steps.len() as i32);
-            *least = if there > 0.0 { least.min(there) } else { *least };
+        if !falls || (earlier / ratio - 1.0).abs() > SETTLED {
+            continue;
+        }
+        let mut power = now[i];
+        for there in steps.iter().rev().skip(1).map(|step| step[i]).chain([whole[i]]) {
+            power *= ratio;
+            if !(there <= LEAVES * power && LEAVES * there >= power) {
+                power = power.min(there);
+                break;
+            }
+        }
+        if power > 0.0 {
+            *least = least.min(power);
         }
     }
 }
 
-/// The part of the start that each variable keeps where rows with constants, which tie it, have about the size of these; all where none does.
-fn natural(pattern: &Pattern, whole: &[f64], steps: &[Vec<f64>]) -> Vec<f64> {
-    let n = whole.len() - 1;
-    let mut parts = vec![0.0_f64; n];
-    if let [.., before, now] = steps {
-        for i in (0..n).filter(|&i| now[i] > 0.0 && now[i] >= LEVEL * before[i]) {
-            let is_level = |sizes: &[f64]| sizes[i] <= LEAVES * now[i];
-            // The last step before it is.
-            let left =
-                if is_level(whole) { Some(0) } else { steps.iter().position(|s| is_level(s)) };
-            let part = left.map_or(0.0, |k| 4.0_f64.powi(-(k as i32)));
-            pattern.row(i).iter().for_each(|&j| parts[j] = parts[j].max(part));
-        }
+/// The short step, from 0 for the start, before which a row with a constant has come to its level.
+fn tied_at(i: usize, whole: &[f64], steps: &[Vec<f64>]) -> Option<usize> {
+    let [.., before, now] = steps else { return None };
+    let is_level = |sizes: &[f64]| sizes[i] <= LEAVES * now[i];
+    match now[i] > 0.0 && now[i] >= LEVEL * before[i] {
+        true if is_level(whole) => Some(0),
+        true => steps.iter().position(|sizes| is_level(sizes)),
+        false => None,
     }
-    parts.iter_mut().filter(|part| **part == 0.0).for_each(|part| *part = 1.0);
-    parts
 }
 
 /// `Σ_j of(J_ij d_j)`
@@ -374,17 +377,10 @@ impl Units {
             }
             // All short ones.
             if steps.len() == STEPS as usize / 2 {
-                extrapolate(&mut least, &steps);
-                let parts = natural(field.pattern(), &whole, &steps);
-                if inwards && parts.iter().any(|part| *part < 1.0) {
-                    let way = from.iter().zip(start).zip(&parts);
-                    let point: Vec<f64> = way.map(|((z, s), part)| z + part * (s - z)).collect();
-                    over |= budget::over();
-                    let look = || terms.look(field.pattern(), &point, !self.expressions);
-                    if !over && tentatively(look) {
-                        let sizes = least.iter_mut().zip(&terms.sizes);
-                        sizes.filter(|s| *s.1 > 0.0).for_each(|(least, d)| *least = least.min(*d));
-                    }
+                note_last_power(&mut least, &whole, &steps);
+                if inwards {
+                    let way = [&from[..], start];
+                    over |= !self.ask_where_tied(way, (&whole, &steps), (field, terms), &mut least);
                 }
             }
         }
@@ -403,6 +399,46 @@ impl Units {
             }
         }
         true
+    }
+
+    /// Takes for units the sizes where the variables are as large as rows with a constant, those of which they make a good part of its size, tie them. False where the time is over before.
+    fn ask_where_tied(
+        &self,
+        [from, start]: [&[f64]; 2],
+        (whole, steps): (&[f64], &[Vec<f64>]),
+        (field, terms): (&dyn Field, &mut Terms),
+        least: &mut [f64],
+    ) -> bool {
+        let (n, pattern) = (start.len(), field.pattern());
+        let tied: Vec<Option<usize>> = (0..n).map(|i| tied_at(i, whole, steps)).collect();
+        let mut parts = vec![0.0_f64; n];
+        let point = |part: &dyn Fn(usize) -> f64| -> Vec<f64> {
+            (0..n).map(|j| from[j] + part(j) * (start[j] - from[j])).collect()
+        };
+        let look = |terms: &mut Terms, x: &[f64]| {
+            !budget::over() && tentatively(|| terms.look(pattern, x, !self.expressions))
+        };
+        for k in 0..steps.len() {
+            let part = 4.0_f64.powi(-(k as i32));
+            if !tied.contains(&Some(k)) || !look(terms, &point(&|_| part)) || !terms.smooth {
+                continue;
+            }
+            for i in (0..n).filter(|&i| tied[i] == Some(k)) {
+                let entries = terms.jacobian[pattern.range(i)].iter().zip(pattern.row(i));
+                let good = steps[steps.len() - 1][i] / pattern.row(i).len() as f64;
+                for (_, &j) in
+                    entries.filter(|(a, j)| (*a * part * (start[**j] - from[**j])).abs() >= good)
+                {
+                    parts[j] = parts[j].max(part);
+                }
+            }
+        }
+        let part = |j: usize| if parts[j] > 0.0 { parts[j] } else { 1.0 };
+        if (0..n).any(|j| part(j) < 1.0) && look(terms, &point(&part)) {
+            let sizes = least.iter_mut().zip(&terms.sizes).filter(|(_, size)| **size > 0.0);
+            sizes.for_each(|(least, size)| *least = least.min(*size));
+        }
+        !budget::over()
     }
 
     fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {

@@ -353,7 +353,10 @@ fn larger_powers_at_a_start_far_off_make_no_error_small() {
         problem.judge(&LcpPoint { z: z.to_vec() }, 1e-8).unwrap().solved
     };
     type Case<'a> = (&'a [&'a str], f64, &'a [f64], &'a [f64]);
-    let wrong: [Case; 8] = [
+    let wrong: [Case; 11] = [
+        (&["x1^5*(x1 - 1)^2"], -inf, &[1e5], &[1.693]),
+        (&["x1^3 + x1^2"], -inf, &[1e8], &[2.32]),
+        (&["6/x1^7 - 12/x1^13"], 0.05, &[0.05], &[35.5]),
         (&["x1*exp(x1^2)"], -inf, &[10.0], &[6.94]),
         (&["x1*exp(x1)"], -inf, &[50.0], &[1.03]),
         (&["x1^9 + x1"], -inf, &[100.0], &[3.0]),
@@ -366,9 +369,13 @@ fn larger_powers_at_a_start_far_off_make_no_error_small() {
     for (f, lower, start, z) in wrong {
         assert!(!judged(f, lower, start, z), "{f:?} at {z:?}");
     }
-    let right: [Case; 6] = [
+    let right: [Case; 9] = [
+        // What a row ties by other variables is not smaller for that.
+        (&["x2", "x2 - (x1^2 - 2)"], -inf, &[1e5, 1.0], &[std::f64::consts::SQRT_2, -4.4e-16]),
+        (&["x2", "x2 - (x1^2 - 2)"], -inf, &[1e6, 10.0], &[std::f64::consts::SQRT_2, -4.4e-16]),
+        (&["x1^9 + x1^8*x2", "x2 - 1"], -inf, &[1000.0, 1000.0], &[-1.0, 1.0]),
         (&["x1*exp(x1^2)"], -inf, &[10.0], &[1e-13]),
-        (&["x1^9 + x1"], -inf, &[100.0], &[1e-11]),
+        (&["x1^9 + x1"], -inf, &[100.0], &[1e-13]),
         // Of one power alone nobody knows the unit but the start.
         (&["x1^3"], -inf, &[1e6], &[1.0]),
         (&["x1^2*x2 - x2^2", "x1 + x2 - 5"], -inf, &[1e9, 1e9], &[5.0, 0.0]),
