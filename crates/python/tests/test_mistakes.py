@@ -326,12 +326,13 @@ def test_arguments_are_named(call, said):
         ({"motion": {"amplitude": None}}, "amplitude|motion"),
         ({"groups": (word for word in "ab")}, "groups: expected numbers, words and lists, found generator"),
         ({"groups": {"a"}}, "groups: expected numbers, words and lists, found set"),
+        ({"shape": {"kind": "sphere", "radius": object()}}, "radius: expected numbers, words and lists, found object"),
     ],
 )
 def test_what_a_table_holds_is_looked_at_where_it_is_given(table, said):
     with pytest.raises(ns.Error, match=said):
         world = ns.World()
-        world.sphere(0.1, density=1.0, **table)
+        world.body(**{"shape": {"kind": "sphere", "radius": 0.1}, "density": 1.0, **table})
         ns.Simulation(world)
 
 
