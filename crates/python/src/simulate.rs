@@ -382,6 +382,16 @@ fn motions(frames: &[Frame]) -> [(&'static str, usize, Vec<f64>); 4] {
     ]
 }
 
+/// Vectors as the rows of a matrix.
+fn table<const N: usize>(
+    py: Python<'_>,
+    rows: impl Iterator<Item = [f64; N]>,
+) -> PyResult<Bound<'_, PyArray2<f64>>> {
+    let all: Vec<f64> = rows.flatten().collect();
+    let count = all.len() / N;
+    PyArray1::from_vec(py, all).reshape([count, N])
+}
+
 /// What a simulation left behind; `nonsmooth.Run` has the words.
 #[pyclass(frozen, module = "nonsmooth._nonsmooth")]
 pub struct Run {
@@ -485,9 +495,7 @@ impl Run {
             || frames.iter().map(|frame| frame.joints.get(number).copied().unwrap_or(blank));
         let all = PyDict::new(py);
         let column = |of: fn(Joint) -> f64| PyArray1::from_iter(py, states().map(of));
-        let triple = |of: fn(Joint) -> [f64; 3]| {
-            PyArray1::from_iter(py, states().flat_map(of)).reshape([frames.len(), 3])
-        };
+        let triple = |of: fn(Joint) -> [f64; 3]| table(py, states().map(of));
         all.set_item("angle", column(|j| j.angle))?;
         all.set_item("slide", column(|j| j.slide))?;
         all.set_item("impulse", triple(|j| j.impulse)?)?;
@@ -512,9 +520,7 @@ impl Run {
         };
         let column = |of: fn(&Contact) -> f64| PyArray1::from_iter(py, contacts.iter().map(of));
         let whole = |of: fn(&Contact) -> i64| PyArray1::from_iter(py, contacts.iter().map(of));
-        let triple = |of: fn(&Contact) -> [f64; 3]| {
-            PyArray1::from_iter(py, contacts.iter().flat_map(of)).reshape([contacts.len(), 3])
-        };
+        let triple = |of: fn(&Contact) -> [f64; 3]| table(py, contacts.iter().map(of));
         all.set_item("a", whole(|c| c.a.into()))?;
         all.set_item("b", whole(|c| c.b.into()))?;
         all.set_item("status", contacts.iter().map(word).collect::<Vec<_>>())?;
@@ -525,11 +531,8 @@ impl Run {
         all.set_item("r", triple(|c| c.r)?)?;
         all.set_item("u", triple(|c| c.u)?)?;
         all.set_item("impulse", triple(Contact::world_impulse)?)?;
-        let double = |of: fn(&Contact) -> [f64; 2]| {
-            PyArray1::from_iter(py, contacts.iter().flat_map(of)).reshape([contacts.len(), 2])
-        };
         all.set_item("mu_r", column(|c| c.mu_r))?;
-        all.set_item("rolling", double(|c| c.rolling)?)?;
+        all.set_item("rolling", table(py, contacts.iter().map(|c| c.rolling))?)?;
         all.set_item("moment", triple(Contact::world_moment)?)?;
         Ok(all)
     }

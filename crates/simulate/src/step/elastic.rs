@@ -211,7 +211,8 @@ impl Solids {
         let solid = &mut self.solids[k as usize];
         let mut v = std::mem::take(&mut solid.v);
         v.clone_from(&solid.impulse);
-        solid.answer(&mut v);
+        let whole = solid.of_force(&v);
+        solid.answer(&mut v, whole);
         v.iter_mut().zip(&solid.free).for_each(|(v, free)| *v += *free);
         solid.v = v;
         for place in solid.nodes.clone() {
@@ -264,7 +265,7 @@ impl Solid {
         }
         let LinearSystem { damping, stiffness, load, .. } = &self.system;
         let Self { rigid, work, free, .. } = self;
-        // f − C v − K x_θ; of what moves as a whole C v is α M v.
+        // f − C v − K x_θ
         free.clone_from(load);
         work.clear();
         work.extend(x.iter().zip(v).map(|(x, v)| x + h * theta * v));
@@ -275,17 +276,14 @@ impl Solid {
         work.copy_from_slice(v);
         let part = rigid.as_ref().map(|rigid| rigid.remove(work));
         damping.mul_add(-1.0, work, free);
-        if let (Some(rigid), Some(part)) = (rigid, part) {
-            rigid.add_momentum(part.map(|part| -self.alpha * part), free);
-            // Nothing inside of it moves it as a whole.
-            let outer = rigid.of_force(load);
-            let given = rigid.of_force(free);
-            let inner = std::array::from_fn(|i| outer[i] - self.alpha * part[i] - given[i]);
-            rigid.add_momentum(inner, free);
-        }
         free.iter_mut().for_each(|f| *f *= h);
+        // Nothing inside of it moves it as a whole; C v is then α M v.
+        let whole = rigid.as_ref().zip(part).map(|(rigid, part)| {
+            let outer = rigid.of_force(load);
+            std::array::from_fn(|i| h * (outer[i] - self.alpha * part[i]))
+        });
         let mut free = std::mem::take(&mut self.free);
-        self.answer(&mut free);
+        self.answer(&mut free, whole);
         free.iter_mut().zip(v).for_each(|(free, v)| *free += v);
         self.free = free;
         self.v.clone_from(&self.free);
@@ -294,12 +292,16 @@ impl Solid {
         super::are_finite(self.free.iter().copied())
     }
 
-    /// `M̂⁻¹ x`.
-    fn answer(&mut self, x: &mut [f64]) {
-        let part = self.rigid.as_ref().map(|rigid| rigid.of_force(x));
+    /// What an impulse makes of what nothing holds as a whole.
+    fn of_force(&self, impulse: &[f64]) -> Option<[f64; 6]> {
+        self.rigid.as_ref().map(|rigid| rigid.of_force(impulse))
+    }
+
+    /// `M̂⁻¹ x`; `whole` is what x makes of the solid as a whole.
+    fn answer(&mut self, x: &mut [f64], whole: Option<[f64; 6]>) {
         self.hat.solve(x);
-        if let (Some(rigid), Some(part), Some((h, theta))) = (&self.rigid, part, self.made_for) {
-            rigid.set(part.map(|part| part / (1.0 + h * theta * self.alpha)), x);
+        if let (Some(rigid), Some(whole), Some((h, theta))) = (&self.rigid, whole, self.made_for) {
+            rigid.set(whole.map(|part| part / (1.0 + h * theta * self.alpha)), x);
         }
     }
 
@@ -325,7 +327,8 @@ impl Solid {
             work.clear();
             work.resize(self.impulse.len(), 0.0);
             work[3 * all[place].node as usize + k] = 1.0;
-            self.answer(&mut work);
+            let whole = self.of_force(&work);
+            self.answer(&mut work, whole);
             for (block, other) in blocks.iter_mut().zip(&all[self.nodes.clone()]) {
                 let column = at(&work, other.node);
                 (0..3).for_each(|l| block[l][k] = column[l]);

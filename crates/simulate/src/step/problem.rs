@@ -743,10 +743,14 @@ fn agree(R: &Csc, bounds: &Bounds, (s, terms): (&mut [f64], &[f64]), redundant: 
     let (load, size) = (most(s), most(terms));
     if load <= ROUNDING * size {
         s.fill(0.0);
+    } else if redundant && ROUNDING * size > KNOWN * load {
+        answer_of(R, bounds, (s, &unit), CLOSED * size);
     }
-    if load <= ROUNDING * size || ROUNDING * size <= KNOWN * load || !redundant {
-        return;
-    }
+}
+
+/// Makes the loads of the free rows `R κ` where none moves by more than `most` in units of √R_jj.
+#[allow(non_snake_case)]
+fn answer_of(R: &Csc, bounds: &Bounds, (s, unit): (&mut [f64], &[f64]), most: f64) {
     let free: Vec<usize> = (0..s.len()).filter(|&j| bounds.is_free(j)).collect();
     let mut place = vec![usize::MAX; s.len()];
     free.iter().enumerate().for_each(|(k, &j)| place[j] = k);
@@ -769,7 +773,7 @@ fn agree(R: &Csc, bounds: &Bounds, (s, terms): (&mut [f64], &[f64]), redundant: 
         }
     }
     let all = || free.iter().zip(&answered);
-    if all().all(|(&j, x)| (x - s[j]).abs() <= CLOSED * size * unit[j]) {
+    if all().all(|(&j, x)| (x - s[j]).abs() <= most * unit[j]) {
         all().for_each(|(&j, &x)| s[j] = x);
     }
 }

@@ -3,7 +3,7 @@
 //! Stiffness K has no answer to them, `K φ = 0`, but in rounding: of a solid that has moved far `K x` would be a force back to where it began, and of one that is stiff for the step, `h² K ≫ M`,
 //! the factor of M̂ would lose momentum. Therefore K is asked of strains alone, and what a solve gives to the rigid motions is put right: `φᵀ M̂ = (1 + h θ α) φᵀ M`.
 
-use nonsmooth_linalg::Csc;
+use nonsmooth_linalg::{Csc, dot};
 use nonsmooth_scenes::vec3::{Vec3, add, cross, scale, sub};
 
 /// Three translations and three small turns φ with `φᵢᵀ M φⱼ = δᵢⱼ`, and `M φ`.
@@ -45,11 +45,6 @@ impl Rigid {
         part
     }
 
-    /// Adds `M φ` by these coordinates: of a velocity's rigid part its momentum.
-    pub fn add_momentum(&self, part: [f64; 6], to: &mut [f64]) {
-        part.iter().zip(&self.momenta).for_each(|(part, momentum)| subtract(-part, momentum, to));
-    }
-
     /// `φᵀ f`: what a force or an impulse makes of the rigid motions.
     pub fn of_force(&self, f: &[f64]) -> [f64; 6] {
         self.modes.each_ref().map(|mode| dot(mode, f))
@@ -62,10 +57,6 @@ impl Rigid {
             subtract(has - part, mode, x);
         }
     }
-}
-
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    x.iter().zip(y).map(|(x, y)| x * y).sum()
 }
 
 /// `y − a x` for y.
