@@ -12,10 +12,11 @@ use nonsmooth_io::trajectory::{Checkpoint, Contact, Frame, Joint, Step as Steppe
 use nonsmooth_problem::check::Motion;
 use nonsmooth_record::Origin;
 use nonsmooth_scenes::draw::{Drawing, svg};
-use nonsmooth_simulate::{Control, RunReport, SceneFile, SimulateError};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods};
+use nonsmooth_scenes::vec3::Vec3;
+use nonsmooth_simulate::{BodyId, Control, RunReport, SceneFile, SimulateError, State, Wrenches};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyBytes, PyDict};
 
 use crate::function::Watcher;
 use crate::wait::{ask, elsewhere};
@@ -105,6 +106,30 @@ pub struct Simulation {
     scene: Arc<SceneFile>,
     /// What all runs begin with: to write the scene down takes as long as many steps.
     begun: OnceLock<Trajectory>,
+    /// What the caller has act in the step that is done.
+    asked: Arc<Mutex<Asked>>,
+}
+
+/// Forces at the mass centres (N) and torques about them (N·m) in the frame of the world, of all bodies or of none.
+#[derive(Default)]
+struct Asked {
+    forces: Vec<Vec3>,
+    torques: Vec<Vec3>,
+}
+
+impl Asked {
+    fn add(&self, wrenches: &mut Wrenches) {
+        let bodies = || (0..).map(BodyId);
+        bodies().zip(&self.forces).for_each(|(body, f)| wrenches.force(body, *f));
+        bodies().zip(&self.torques).for_each(|(body, t)| wrenches.torque(body, *t));
+    }
+}
+
+/// The rows of a matrix, of none none.
+fn rows(matrix: Option<PyReadonlyArray2<'_, f64>>) -> Vec<Vec3> {
+    let matrix = matrix.as_ref().map(|m| m.as_array());
+    let rows = matrix.iter().flat_map(|m| m.rows());
+    rows.map(|row| std::array::from_fn(|i| row[i])).collect()
 }
 
 fn busy() -> PyErr {
@@ -117,12 +142,23 @@ impl Simulation {
         &self,
         what: impl FnOnce(&mut nonsmooth_simulate::Simulation) -> PyResult<T>,
     ) -> PyResult<T> {
-        what(self.locked().as_mut().ok_or_else(busy)?)
+        what(locked(&self.inner).as_mut().ok_or_else(busy)?)
     }
 
-    fn locked(&self) -> MutexGuard<'_, Option<nonsmooth_simulate::Simulation>> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The limits of the scene on each solve, which `watcher` may end.
+    fn limits(&self, watcher: &Watcher) -> nonsmooth_solve::Limits {
+        nonsmooth_solve::Limits {
+            tolerance: self.scene.solver.tol,
+            max_iterations: ITERATIONS,
+            cancel: Some(watcher.stop.clone()),
+            ..Default::default()
+        }
     }
+}
+
+/// What a thread that panicked left is whole all the same: it is written in one go.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[pymethods]
@@ -131,8 +167,11 @@ impl Simulation {
     #[new]
     fn new(py: Python<'_>, scene: &str, settle: bool) -> PyResult<Self> {
         let scene = Arc::new(SceneFile::parse(scene, &[]).map_err(mistake)?);
-        let inner = Mutex::new(Some(built(py, &scene, settle)?));
-        Ok(Self { inner, scene, begun: OnceLock::new() })
+        let asked = Arc::new(Mutex::new(Asked::default()));
+        let acts = asked.clone();
+        let force = move |_: &State, wrenches: &mut Wrenches| locked(&acts).add(wrenches);
+        let inner = Mutex::new(Some(built(py, &scene, settle)?.with_force(force)));
+        Ok(Self { inner, scene, begun: OnceLock::new(), asked })
     }
 
     /// The time, s.
@@ -190,14 +229,9 @@ impl Simulation {
         if every == 0 {
             return Err(expected("every", "at least 1 step between two frames", 0));
         }
-        let simulation = self.locked().take().ok_or_else(busy)?;
+        let simulation = locked(&self.inner).take().ok_or_else(busy)?;
         let watcher = Arc::new(Watcher::default());
-        let limits = nonsmooth_solve::Limits {
-            tolerance: self.scene.solver.tol,
-            max_iterations: ITERATIONS,
-            cancel: Some(watcher.stop.clone()),
-            ..Default::default()
-        };
+        let limits = self.limits(&watcher);
         let told = callback.is_some();
         let begun = || nonsmooth_record::begun(&self.scene, &simulation);
         let mut trajectory = self.begun.get_or_init(begun).clone();
@@ -241,13 +275,56 @@ impl Simulation {
                 (simulation, trajectory, report)
             })
         });
-        *self.locked() = Some(simulation);
+        *locked(&self.inner) = Some(simulation);
         if let Some(fault) = watcher.fault() {
             return Err(fault);
         }
         let report = report.map_err(mistake)?;
         py.check_signals()?;
         Ok(Run { trajectory, report, scene: self.scene.clone() })
+    }
+
+    /// Does one step of length h with forces and torques, b × 3, that act in it alone.
+    #[pyo3(signature = (h, forces, torques))]
+    fn step(
+        &self,
+        py: Python<'_>,
+        h: f64,
+        forces: Option<PyReadonlyArray2<'_, f64>>,
+        torques: Option<PyReadonlyArray2<'_, f64>>,
+    ) -> PyResult<Step> {
+        let simulation = locked(&self.inner).take().ok_or_else(busy)?;
+        *locked(&self.asked) = Asked { forces: rows(forces), torques: rows(torques) };
+        let watcher = Arc::new(Watcher::default());
+        let limits = self.limits(&watcher);
+        let hear = |_: Option<()>| ask(&watcher, |_| Ok(false));
+        let (simulation, done) = py.detach(|| {
+            elsewhere(hear, move |_| {
+                let mut simulation = simulation.with_limits(limits);
+                let report = simulation.step(h);
+                let done = report.map(|report| Step {
+                    step: nonsmooth_record::step(simulation.state().steps, &report),
+                    frame: nonsmooth_record::frame(&simulation),
+                });
+                (simulation, done)
+            })
+        });
+        *locked(&self.asked) = Asked::default();
+        *locked(&self.inner) = Some(simulation);
+        match watcher.fault() {
+            Some(fault) => Err(fault),
+            None => done.map_err(mistake),
+        }
+    }
+
+    /// All that the next step depends on.
+    fn checkpoint<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        self.with(|s| Ok(PyBytes::new(py, &s.checkpoint())))
+    }
+
+    /// Goes back, or on, to a checkpoint of the same world.
+    fn restore(&self, checkpoint: &[u8]) -> PyResult<()> {
+        self.with(|s| s.restore(checkpoint).map_err(mistake))
     }
 }
 

@@ -1,7 +1,9 @@
 //! Waiting for a computation on another thread, so that Ctrl-C is seen and the user's functions run on the thread that asked.
 
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{RecvTimeoutError, channel, sync_channel};
+use std::sync::mpsc::{RecvTimeoutError, SendError, Sender, channel, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use pyo3::prelude::*;
@@ -24,6 +26,51 @@ pub fn ask(watcher: &Watcher, user: impl FnOnce(Python<'_>) -> PyResult<bool>) {
     }
 }
 
+/// What a thread does; it calls what it is handed when it has no more to do than to say what it found.
+type Job = Box<dyn FnOnce(&dyn Fn()) + Send>;
+
+/// The threads of a process that have nothing to do: to wake one takes less than a step of a small simulation, to make one takes more.
+struct Idle {
+    /// A process that was forked has none of the threads that its list tells of.
+    process: u32,
+    threads: Vec<Sender<Job>>,
+}
+
+static IDLE: Mutex<Idle> = Mutex::new(Idle { process: 0, threads: vec![] });
+
+impl Idle {
+    fn now() -> MutexGuard<'static, Self> {
+        let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+        let process = std::process::id();
+        if idle.process != process {
+            *idle = Self { process, threads: vec![] };
+        }
+        idle
+    }
+
+    /// Has a job done by one of them, or by a new one, which then is one of them.
+    fn give(job: Job) {
+        let idle = Self::now().threads.pop();
+        match idle {
+            None => Self::hire(job),
+            Some(thread) => {
+                if let Err(SendError(job)) = thread.send(job) {
+                    Self::hire(job);
+                }
+            }
+        }
+    }
+
+    fn hire(first: Job) {
+        let (give, jobs) = channel();
+        std::thread::spawn(move || {
+            let rest = || Self::now().threads.push(give.clone());
+            first(&rest);
+            jobs.iter().for_each(|job: Job| job(&rest));
+        });
+    }
+}
+
 /// Runs a task on another thread. `hear` is called on this one with each piece of news, until which the task waits, and with nothing every [`TICK`].
 /// Python must have been let go of.
 pub fn elsewhere<N: Send + 'static, T: Send + 'static>(
@@ -32,36 +79,31 @@ pub fn elsewhere<N: Send + 'static, T: Send + 'static>(
 ) -> T {
     enum Said<N, T> {
         News(N),
-        Done(Box<T>),
+        Done(std::thread::Result<Box<T>>),
     }
     let (say, listen) = channel();
     let (heard, go_on) = sync_channel::<()>(0);
-    let thread = std::thread::spawn(move || {
-        let news = say.clone();
-        let done = task(&mut |one| {
-            if news.send(Said::News(one)).is_ok() {
+    Idle::give(Box::new(move |rest| {
+        let mut tell = |one| {
+            if say.send(Said::News(one)).is_ok() {
                 // Until it was heard; an error is that nobody waits any more.
                 let _ = go_on.recv();
             }
-        });
-        let _ = say.send(Said::Done(Box::new(done)));
-    });
+        };
+        let done = catch_unwind(AssertUnwindSafe(|| Box::new(task(&mut tell))));
+        rest();
+        let _ = say.send(Said::Done(done));
+    }));
     loop {
         match listen.recv_timeout(TICK) {
-            Ok(Said::Done(done)) => {
-                // A thread that has sent what it found does nothing more.
-                let _ = thread.join();
-                return *done;
-            }
+            Ok(Said::Done(Ok(done))) => return *done,
+            Ok(Said::Done(Err(panic))) => resume_unwind(panic),
             Ok(Said::News(news)) => {
                 hear(Some(news));
                 let _ = heard.send(());
             }
             Err(RecvTimeoutError::Timeout) => hear(None),
-            Err(RecvTimeoutError::Disconnected) => match thread.join() {
-                Err(panic) => std::panic::resume_unwind(panic),
-                Ok(()) => unreachable!("a task ends with what it found"),
-            },
+            Err(RecvTimeoutError::Disconnected) => unreachable!("a task says what it found"),
         }
     }
 }

@@ -99,6 +99,95 @@ def test_ctrl_c_ends_a_run():
     assert simulation.t > 0
 
 
+def test_steps_are_those_of_a_run():
+    stepped, ran = ns.Simulation(ball(), h=1e-3), ns.Simulation(ball(), h=1e-3)
+    steps = [stepped.step() for _ in range(600)]
+    run = ran.run(0.6)
+    assert {step.status for step in steps} == {"solved"} and [step.number for step in steps] == list(range(1, 601))
+    for name in ("position", "rotation", "velocity", "angular_velocity"):
+        np.testing.assert_array_equal(getattr(stepped, name), getattr(ran, name))
+    np.testing.assert_array_equal([step.energy["kinetic"] for step in steps], run.energy["kinetic"])
+    np.testing.assert_array_equal(steps[299].position, run.position[300])
+
+
+def test_a_controller_holds_a_ball_that_hovers_and_turns():
+    simulation = ns.Simulation(ball(height=2.0, e=0.0), h=1e-3)
+    mass = 1000 * 4 / 3 * np.pi * 0.1**3
+    forces, torques = np.zeros((2, 3)), np.zeros((2, 3))
+    torques[1, 2] = 1e-3
+    work = 0.0
+    for _ in range(1000):
+        error = 1.5 - simulation.position[1, 2]
+        forces[1, 2] = mass * (9.81 + 40 * error - 12 * simulation.velocity[1, 2])
+        step = simulation.step(forces=forces, torques=torques)
+        work += step.energy["forces"]
+        assert step.status == "solved" and abs(step.energy["imbalance"]) < 1e-12
+    # A torque for a second, on a ball whose inertia is 2/5 m r²; a spring with ω² = 40, damped by 2 · 6, from .5 above.
+    np.testing.assert_allclose(simulation.angular_velocity[1], [0, 0, 1e-3 / (0.4 * mass * 0.01)], atol=1e-9)
+    left = 0.5 * np.exp(-6.0) * (np.cos(2.0) + 3.0 * np.sin(2.0))
+    assert abs(simulation.position[1, 2] - 1.5 - left) < 5e-5 and work < 0
+    # They act in the steps that they are asked for, and no longer.
+    v = simulation.velocity[1, 2]
+    simulation.step()
+    assert simulation.velocity[1, 2] == pytest.approx(v - 9.81e-3, abs=1e-12)
+    simulation.run(simulation.t + 1e-3)
+    assert simulation.velocity[1, 2] == pytest.approx(v - 2 * 9.81e-3, abs=1e-12)
+
+
+def test_a_simulation_goes_back_to_a_checkpoint():
+    simulation, other = ns.Simulation(ball(), h=1e-3), ns.Simulation(ball(), h=1e-3)
+    simulation.run(0.44)
+    kept = simulation.checkpoint()
+    ahead = [simulation.step(forces=[[0, 0, 0], [5.0, 0, 0]]).position for _ in range(300)]
+    for again in (simulation, other):
+        again.restore(kept)
+        assert again.t == pytest.approx(0.44)
+        np.testing.assert_array_equal([again.step(forces=[[0, 0, 0], [5.0, 0, 0]]).position for _ in range(300)], ahead)
+    for wrong, said in ((b"{}", "checkpoint: expected one of a world of 2 bodies, found"), ("text", "checkpoint: expected bytes")):
+        with pytest.raises(ns.Error, match=said):
+            simulation.restore(wrong)
+
+
+@pytest.mark.parametrize(
+    "given, said",
+    [
+        ({"forces": [0, 0, 1]}, "forces: expected finite numbers, bodies × 3 = 2 × 3, found (3,)"),
+        ({"torques": "up"}, "torques: expected finite numbers, bodies × 3 = 2 × 3, found 'up'"),
+        ({"torques": [[0, 0, 0], [0, np.inf, 0]]}, "torques[1, 1]: expected a finite number, found inf"),
+    ],
+)
+def test_what_is_asked_of_a_step_is_checked(given, said):
+    simulation = ns.Simulation(ball(), h=1e-3)
+    with pytest.raises(ns.Error) as caught:
+        simulation.step(**given)
+    assert str(caught.value) == said and simulation.t == 0
+
+
+def test_ctrl_c_ends_a_step_and_leaves_the_world_as_it_was():
+    world = ns.World()
+    world.pair("default", mu=0.3)
+    world.generate("polyhedra", count=4000)
+    simulation = ns.Simulation(world, h=1e-2, tol=1e-12)
+    threading.Timer(0.05, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        while True:
+            before = simulation.t
+            simulation.step()
+    assert simulation.t == before
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_threads_that_wait_are_not_asked_for_by_a_process_that_was_forked():
+    simulation = ns.Simulation(ball(), h=1e-3)
+    simulation.step()
+    child = os.fork()
+    if child == 0:
+        # Nothing of pytest may run here.
+        os._exit(0 if simulation.step().number == 2 else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert simulation.step().number == 2
+
+
 def test_ctrl_c_ends_the_making_of_a_world():
     world = ns.World()
     world.pair("default", mu=0.3)

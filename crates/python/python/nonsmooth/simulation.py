@@ -416,6 +416,44 @@ class Simulation:
             raise arguments.mistake("until", f"a time of at least 0 s (it is {self.t:g} s)", until)
         return Run(self._native.run(until, self.h, every, on_step), self)
 
+    def step(
+        self, *, forces: Optional[npt.ArrayLike] = None, torques: Optional[npt.ArrayLike] = None
+    ) -> Step:
+        """Moves on by one step of ``h``, and returns what it came to; its ``status`` is "solved" where the judge accepts it.
+
+        ``forces`` (N, at the mass centres) and ``torques`` (N·m, about them), bodies × 3 in the frame of the world, act in this step alone, beside those of the world: what a
+        controller asks for. Bodies that stand or are moved do not feel them. No trajectory is kept; :meth:`run` keeps one. Ctrl-C raises KeyboardInterrupt, with the
+        simulation as it was before the step.
+        """
+        wrenches = (self._rows("forces", forces), self._rows("torques", torques))
+        return self._native.step(self.h, *wrenches)
+
+    def _rows(self, place: str, value: Optional[npt.ArrayLike]) -> Optional[Vector]:
+        """A vector of the space for each body."""
+        if value is None:
+            return None
+        expected = f"finite numbers, bodies × 3 = {len(self.bodies)} × 3"
+        try:
+            rows = np.ascontiguousarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise arguments.mistake(place, expected, value) from None
+        if rows.shape != (len(self.bodies), 3):
+            raise arguments.mistake(place, expected, rows.shape)
+        if not np.isfinite(rows).all():
+            body, axis = np.argwhere(~np.isfinite(rows))[0]
+            raise arguments.mistake(f"{place}[{body}, {axis}]", "a finite number", float(rows[body, axis]))
+        return rows
+
+    def checkpoint(self) -> bytes:
+        """All that the next step depends on, to be kept; :meth:`restore` goes on from it, bit for bit, in any simulation of the same world."""
+        return self._native.checkpoint()
+
+    def restore(self, checkpoint: bytes) -> None:
+        """Goes back, or on, to a checkpoint of the same world."""
+        if not isinstance(checkpoint, (bytes, bytearray)):
+            raise arguments.mistake("checkpoint", "bytes, of Simulation.checkpoint", type(checkpoint).__name__)
+        self._native.restore(bytes(checkpoint))
+
 
 class Run:
     """What a simulation left behind: of each step time, energies, residual and counts; of each frame the motion and the contacts."""

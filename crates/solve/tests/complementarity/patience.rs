@@ -122,6 +122,99 @@ fn auto_takes_few_steps_on_grids_whose_face_moves() {
     assert!(answer.iterations < 50, "{} {:#?}", answer.iterations, answer.account);
 }
 
+/// Drivers to two destinations in a ring of streets and as many across, some at random: flows f of each street to each destination, and the times T that they have to go, `a + b (f/c)⁴ + T_j − T_i ≥ 0 ⟂ f ≥ 0` and
+/// what comes in and starts goes out, T ≥ 0 (Aashtiani and Magnanti's form). Streets, costs a, b and capacities c with the problem.
+struct Traffic {
+    problem: Mcp,
+    streets: Vec<(usize, usize)>,
+    costs: Vec<[f64; 3]>,
+    nodes: usize,
+}
+
+const DESTINATIONS: usize = 2;
+
+impl Traffic {
+    fn new(nodes: usize, across: usize, seed: u64) -> Self {
+        let mut rng = Pcg64::seed_from_u64(seed);
+        let mut streets: Vec<_> = (0..nodes).map(|i| (i, (i + 1) % nodes)).collect();
+        streets.extend((0..across).map(|_| {
+            let from = rng.random_range(0..nodes);
+            (from, (from + rng.random_range(1..nodes)) % nodes)
+        }));
+        let mut uniform = |low: f64, high: f64| rng.random_range(low..high);
+        let costs: Vec<[f64; 3]> = streets
+            .iter()
+            .map(|_| [uniform(1.0, 5.0), uniform(0.1, 1.0), uniform(1.0, 5.0)])
+            .collect();
+        let flow = |street: usize, to: usize| format!("x{}", street * DESTINATIONS + to + 1);
+        let flows = streets.len() * DESTINATIONS;
+        // No time to go at the destination itself.
+        let places = (0..DESTINATIONS).flat_map(|to| (0..nodes).map(move |i| (i, to)));
+        let places: Vec<_> = places.filter(|(i, to)| i != to).collect();
+        let time = |place: (usize, usize), sign: &str| {
+            let at = places.iter().position(|p| *p == place);
+            at.map_or(String::new(), |k| format!(" {sign} x{}", flows + k + 1))
+        };
+        let mut rows = vec![];
+        for (k, (&(i, j), [a, b, c])) in streets.iter().zip(&costs).enumerate() {
+            for to in 0..DESTINATIONS {
+                let cost = format!("{a} + {b}*(({} + {})/{c})^4", flow(k, 0), flow(k, 1));
+                rows.push(format!("{cost}{}{}", time((j, to), "+"), time((i, to), "-")));
+            }
+        }
+        for &(i, to) in &places {
+            let ends = streets.iter().enumerate().flat_map(|(k, s)| {
+                [(s.0, "+"), (s.1, "-")].map(|(end, sign)| (end, sign, flow(k, to)))
+            });
+            let balance = ends.filter(|e| e.0 == i).map(|(_, sign, f)| format!("{sign} {f} "));
+            rows.push(format!("0 {}- {}", balance.collect::<String>(), uniform(0.0, 4.0)));
+        }
+        let n = rows.len();
+        let f = Expressions::parse(&rows, &[]).unwrap();
+        let problem = Mcp::new(f, vec![0.0; n], vec![f64::INFINITY; n], vec![1.0; n]).unwrap();
+        Self { problem, streets, costs, nodes }
+    }
+
+    /// By how much drivers take longer than on the quickest way, which Bellman and Ford find.
+    fn detour(&self, x: &[f64]) -> f64 {
+        let flow = |k: usize, to: usize| x[k * DESTINATIONS + to];
+        let taken = |k: usize| flow(k, 0) + flow(k, 1);
+        let costs: Vec<f64> =
+            (0..).zip(&self.costs).map(|(k, [a, b, c])| a + b * (taken(k) / c).powi(4)).collect();
+        let mut worst: f64 = 0.0;
+        for to in 0..DESTINATIONS {
+            let mut time = vec![f64::INFINITY; self.nodes];
+            time[to] = 0.0;
+            for _ in 0..self.nodes {
+                for (&(i, j), cost) in self.streets.iter().zip(&costs) {
+                    time[i] = time[i].min(cost + time[j]);
+                }
+            }
+            for (k, (&(i, j), cost)) in self.streets.iter().zip(&costs).enumerate() {
+                if flow(k, to) > 1e-6 {
+                    worst = worst.max(cost + time[j] - time[i]);
+                }
+            }
+        }
+        worst
+    }
+}
+
+#[test]
+fn auto_finds_equilibria_of_traffic() {
+    let mut late = 0;
+    for seed in 0..24 {
+        let traffic = Traffic::new(8 + seed as usize % 4 * 2, 12, seed);
+        let answer = Solve::new().max_iterations(4000).run(&traffic.problem).unwrap();
+        assert!(answer.is_solved(), "{seed}: {} {:#?}", answer.status, answer.account);
+        let detour = traffic.detour(&answer.point.z);
+        assert!(detour < 1e-5, "{seed}: {detour:e}");
+        late += usize::from(answer.iterations > 1000);
+    }
+    // Some are not for the first methods.
+    assert!(late > 0);
+}
+
 /// A linear program with its dual, some of whose variables cost nothing: the prices of what they yield are zero, and no point has all of z and w positive.
 #[test]
 fn auto_leaves_interior_points_in_time_where_there_is_no_interior() {

@@ -107,9 +107,11 @@ impl Auto {
             1 => plan
                 .anew(named("semismooth"), 600, "with other options")
                 .anew(named("newton_pfb"), 300, "another memory, other starts")
-                .anew(named("newton_fb"), 600, "another function, other starts")
-                .anew(named("miles"), 100, "linearises complementarity")
+                .anew(named("newton_fb"), 100, "another function")
+                .anew(named("miles"), 60, "linearises complementarity")
                 .anew(named("semicomp"), 3000, "leaves stationary points")
+                .anew(named("newton_fb"), 600, "other starts")
+                .anew(named("miles"), 200, "longer")
                 .anew(named("proxi"), 3000, "without crash")
                 .with("crash", false),
             _ => {
