@@ -106,6 +106,34 @@ fn a_motor_reaches_its_speed_saturates_or_stalls() {
     }
 }
 
+/// A row that its own impulse moves by less than velocities are rounded: it moves at 1 whatever the impulse, which therefore is at its lower bound.
+#[test]
+fn a_row_that_no_impulse_moves_has_its_impulse_at_the_bound() {
+    let column = |g: f64| Csc::from_triplets(2, 1, [(1, 0, g)].into_iter()).unwrap();
+    for g in [0.0, 1e-170, 1e-30, 1e-17, 1e-16, 1e-15, 1e-14, 1e-12] {
+        for (bounds, right) in [([-1.0, 1.0], -1.0), ([0.0, f64::INFINITY], 0.0)] {
+            let bounds = Bounds { lower: vec![bounds[0]], upper: vec![bounds[1]] };
+            let mut global = motor(1.0);
+            global.f = vec![0.0, -2.0];
+            // Along x, which is the first degree of freedom.
+            let along = Csc::from_triplets(2, 1, [(0, 0, g)].into_iter()).unwrap();
+            global.rows = Some(RowsGlobal { G: along, b: vec![1.0], bounds: bounds.clone() });
+            let w = Bsr::from_rows(1, &[vec![(0, [[1.0, 0.0], [0.0, 1.0]])]]);
+            let mut local = FrictionLocal::<2>::new(w, vec![-2.0, 0.0], vec![0.5]).unwrap();
+            let own = Csc::from_triplets(1, 1, [(0, 0, g * g)].into_iter()).unwrap();
+            local.rows = Some(RowsLocal { V: column(g), R: own, s: vec![1.0], bounds });
+            for lambda in [-5.0, -1.0, 0.0, 0.5, 3.0] {
+                let r = vec![2.0, -lambda * g];
+                let (v, impulse) = (vec![0.0; 2], vec![lambda]);
+                let at = GlobalPoint { v, r: r.clone(), lambda: impulse.clone() };
+                assert_eq!(relative(&global, &at).0, lambda == right, "{g:e} {lambda}");
+                let at = LocalPoint { r, lambda: impulse };
+                assert_eq!(relative(&local, &at).0, lambda == right, "{g:e} {lambda}");
+            }
+        }
+    }
+}
+
 /// Two limits of the same joint that leave no motion: refuted, in exact arithmetic, by the impulses of both.
 #[test]
 fn limits_that_contradict_each_other_are_refuted() {

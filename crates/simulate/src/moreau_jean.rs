@@ -128,7 +128,7 @@ pub enum Stabilisation {
     /// After each step the smallest corrections of positions and of velocities, in the norm of the masses, that close joints.
     DirectProjection,
     /// The same, and positions are moved out of penetration too, velocities are not; also limits of joints are kept. A step costs a detection more, and where
-    /// something penetrates some frictionless problems.
+    /// something penetrates some frictionless problems. What was pushed takes part in the next step, or what is lifted would fall again and again.
     ContactProjection,
     /// The same, and contacts that the projection pushes but the forecast had open take part in the step, which is tried anew until no more come.
     CombinedProjection,

@@ -10,7 +10,7 @@
 //!
 //! so energy cannot grow where `s = c u_k` of all that open and `|s| ≤ c |u_k|` of all that approach: c is the largest e among the impacts of the island, and at least
 //! the row's own unless it lasts. So what rests or rolls keeps `u⁺ ≥ 0` until something hits it, and as c ≤ 1 no gap closes at θ = ½. Frémond's law, by which each contact
-//! dissipates by itself, then asks for u_θ ≥ 0.
+//! dissipates by itself, asks for u_θ ≥ 0 of all that open, also where nothing rebounds.
 
 use crate::Impact;
 
@@ -19,7 +19,7 @@ use crate::Impact;
 pub(crate) struct Rule {
     /// What approaches no faster does not rebound.
     threshold: f64,
-    /// The least c, where there is one.
+    /// The least c of what opens.
     least: f64,
 }
 
@@ -58,7 +58,6 @@ impl Restitution {
             return self.impact;
         }
         let own = if u > rule.threshold { self.opening } else { 0.0 };
-        let c = hit.max(own);
-        if u > 0.0 && c > 0.0 { c.max(rule.least) } else { 0.0 }
+        if u > 0.0 { hit.max(own).max(rule.least) } else { 0.0 }
     }
 }

@@ -371,7 +371,7 @@ impl Simulation {
         require(|| "h".into(), h, h > 0.0, "a positive number")?;
         let Self { world, scheme, state, forces, tools, .. } = self;
         let axes = state.memory.axes.clone();
-        tools.insisted.clear();
+        tools.insist_on_pushed(state);
         let problem = tools.problem(Stride { world, scheme, h }, state, forces);
         state.memory.axes = axes;
         problem
@@ -430,7 +430,7 @@ impl Driven for Simulation {
         let Self { world, scheme, state, forces, tools, projection, .. } = self;
         let inner = Inner { solver: &self.solver, settings: &self.settings, limits: &self.limits };
         let stride = Stride { world, scheme, h };
-        tools.insisted.clear();
+        tools.insist_on_pushed(state);
         let mut report = tools.attempt(stride, state, forces, &inner)?;
         let Some(projection) = projection
             .as_mut()
@@ -459,6 +459,9 @@ impl Driven for Simulation {
             let found = projection.project(world, state, &inner)?;
             if !found.closed && report.status == StepStatus::Solved {
                 report.status = StepStatus::ProjectionLimit;
+            }
+            if scheme.stabilisation == Stabilisation::ContactProjection {
+                state.memory.note_pushed(&found.pushed);
             }
             if found.moved {
                 report.energy.potential = world.potential(state);

@@ -102,6 +102,22 @@ impl ContactMemory {
         if self.h > 0.0 { h / self.h } else { 0.0 }
     }
 
+    /// How deep two shapes may be in each other, m; zero where they were not near in the last step.
+    pub(crate) fn depth(&self, pair: (u32, u32)) -> f64 {
+        let first = self.contacts.partition_point(|m| m.key.pair() < pair);
+        let same = self.contacts[first..].iter().take_while(|m| m.key.pair() == pair);
+        same.fold(0.0, |most, m| most.max(m.depth))
+    }
+
+    /// Notes which contacts the projection pushed.
+    pub(crate) fn note_pushed(&mut self, pushed: &[Key]) {
+        for key in pushed {
+            if let Ok(k) = self.contacts.binary_search_by_key(key, |m| m.key) {
+                self.contacts[k].pushed = true;
+            }
+        }
+    }
+
     /// The impulse of a scalar row in the last step.
     pub(crate) fn impulse(&self, key: (u32, u32)) -> f64 {
         let place = self.impulses.binary_search_by_key(&key, |e| e.0);
@@ -128,6 +144,12 @@ pub(crate) struct Remembered {
     /// Whether rolling friction held it.
     #[serde(default)]
     pub unrolled: bool,
+    /// How deep the bodies may be there after the step, m: what they could come nearer, less the gap before.
+    #[serde(default)]
+    pub depth: f64,
+    /// Whether the projection behind the step pushed it.
+    #[serde(default)]
+    pub pushed: bool,
 }
 
 /// The kind of separating axis of two polyhedra.

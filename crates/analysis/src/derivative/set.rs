@@ -224,7 +224,7 @@ impl Making<'_> {
 
     fn cone(&mut self, first: usize, dimension: usize) {
         let all = first..first + dimension;
-        let (p, x) = (&self.held.from[all.clone()], &self.point[all.clone()]);
+        let p = &self.held.from[all.clone()];
         let rest = norm(p[1..].iter().copied());
         // The spectral values, of which x has the positive parts.
         let (least, most) = (p[0] - rest, p[0] + rest);
@@ -234,13 +234,19 @@ impl Making<'_> {
             // At the point, where its columns are fixed as they are.
             return;
         }
+        let on = least < 0.0;
+        // The projection, which is on the border exactly: what x misses it by would count as much as the multiplier is large, near the tip.
+        let x: Vec<f64> = match on {
+            true => (0..dimension)
+                .map(|j| 0.5 * most * if j == 0 { 1.0 } else { p[j] / rest })
+                .collect(),
+            false => self.point[all.clone()].to_vec(),
+        };
         let square: f64 = x.iter().map(|x| x * x).sum();
         let signed = |j: usize, x: f64| if j == 0 { x } else { -x };
         let power: f64 =
             x.iter().zip(&self.f[first..]).enumerate().map(|(j, (x, f))| signed(j, x * f)).sum();
-        let on = least < 0.0;
         let lambda = if on { power / square } else { 0.0 };
-        let x = x.to_vec();
         self.free(all);
         if !on {
             return;

@@ -20,6 +20,11 @@ impl Aabb {
         (0..3).all(|k| self.low[k] <= other.high[k] && other.low[k] <= self.high[k])
     }
 
+    /// Larger by so much on all sides.
+    pub fn grown(&self, by: f64) -> Self {
+        Self { low: self.low.map(|x| x - by), high: self.high.map(|x| x + by) }
+    }
+
     /// How far x is from it; zero within.
     pub fn distance(&self, x: Vec3) -> f64 {
         let beyond = |k: usize| (self.low[k] - x[k]).max(x[k] - self.high[k]).max(0.0);

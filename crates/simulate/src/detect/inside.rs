@@ -74,9 +74,7 @@ impl Surface {
         // Above the surface the way from the middle to a point of the solid behind the triangle leads through that.
         if is_below || foot.within {
             let reach = foot.far + other.size();
-            let wide =
-                Aabb { low: bounds.low.map(|x| x - reach), high: bounds.high.map(|x| x + reach) };
-            self.near(pose, &wide, &mut near);
+            self.near(pose, &bounds.grown(reach), &mut near);
             let face = self.faces[foot.triangle as usize];
             for &t in near.iter().filter(|&&t| self.faces[t as usize] == face) {
                 self.template(t, pose, &mut scratch.thin);

@@ -43,7 +43,7 @@ use crate::elastic::{Foot, Nodes};
 use crate::error::within_limits;
 use crate::periodic::{Image, Pair};
 use crate::rotation::Pose;
-use crate::state::{Axis, State};
+use crate::state::{Axis, ContactMemory, State};
 use crate::{BodyId, Compliance, Dimension, Law, Motion, Shape, SimulateError, World};
 use broad::{Aabb, Broad};
 use clip::Clip;
@@ -181,7 +181,7 @@ impl Solids {
             }
             Solid::Plane(_) => return,
         };
-        *bounds = Aabb { low: low.map(|x| x - margin), high: high.map(|x| x + margin) };
+        *bounds = Aabb { low, high }.grown(margin);
     }
 }
 
@@ -381,13 +381,16 @@ impl Detector {
         let parts = crew.parts(self.pairs.len());
         let mut finders = std::mem::take(&mut self.finders);
         finders.resize_with(finders.len().max(parts), Finder::default);
-        let (this, known, t) = (&*self, &state.memory.axes[..], state.t);
+        let (this, t) = (&*self, state.t);
+        // Of what was never looked at nothing is known.
+        let known = (state.steps > 0).then_some(&state.memory);
         let share = this.pairs.len().div_ceil(parts).max(1);
         let used = this.pairs.len().div_ceil(share);
         crew.spread((0..used, &mut finders[..used]), this.pairs.len(), |(numbers, finders)| {
             for (k, finder) in numbers.zip(finders) {
                 let end = this.pairs.len().min(share * (k + 1));
-                this.find((world, t), margins, &this.pairs[share * k..end], known, finder);
+                let axes = &state.memory.axes[..];
+                this.find((world, t), margins, &this.pairs[share * k..end], (axes, known), finder);
             }
         });
         if budget::over() {
@@ -409,13 +412,13 @@ impl Detector {
         self.facing.find(world, state, (margins, &self.nodes), out, feet);
     }
 
-    /// The narrow phase of consecutive pairs, with the separating axes `known`; all lists are sorted.
+    /// The narrow phase of consecutive pairs, with the separating axes `known` and what is remembered of the step before, if there was one; all lists are sorted.
     fn find(
         &self,
         (world, t): (&World, f64),
         margins: &[f64],
         pairs: &[Pair],
-        known: &[(Pair, Axis)],
+        (known, before): (&[(Pair, Axis)], Option<&ContactMemory>),
         finder: &mut Finder,
     ) {
         finder.found.clear();
@@ -440,9 +443,12 @@ impl Detector {
                 last += 1;
             }
             let axis = known.get(last).filter(|k| k.0 == pair).map(|k| k.1);
-            let prediction = margins[p as usize] + margins[q as usize];
+            let reach = Reach {
+                margins: [p, q].map(|body| margins[body as usize]),
+                depth: before.map_or(f64::INFINITY, |memory| memory.depth((i, j))),
+            };
             let first = finder.found.len();
-            let now = self.narrow((world, t), pair, axis, prediction, finder);
+            let now = self.narrow((world, t), pair, axis, reach, finder);
             finder.axes.extend(now.map(|now| (pair, now)));
             finder.found[first..].sort_unstable_by_key(|n| n.key);
             let surface = |k: u32| matches!(self.solids[k as usize].solid, Solid::Surface(_));
@@ -530,7 +536,7 @@ impl Detector {
         (world, time): (&World, f64),
         Pair { first: i, second: j, image }: Pair,
         axis: Option<Axis>,
-        prediction: f64,
+        Reach { margins, depth }: Reach,
         Finder { clip, scratch, found: out, image: moved, .. }: &mut Finder,
     ) -> Option<Axis> {
         let Self { solids, poses, hulls, boxes, box_of, .. } = self;
@@ -555,6 +561,7 @@ impl Detector {
                 (&posed, &*moved)
             }
         };
+        let prediction = margins[0] + margins[1];
         let law = world.law_between(s.material, t.material);
         let compliance = world.compliance_between(s.material, t.material);
         let size = s.size.min(t.size);
@@ -688,19 +695,20 @@ impl Detector {
                 None
             }
             (Solid::Surface(p), Solid::Surface(q)) => {
-                surfaces::collide((p, a), (q, b), prediction, (clip, scratch), found);
+                surfaces::collide((p, a), (q, b), (prediction, depth), (clip, scratch), found);
                 None
             }
             (Solid::Surface(surface), other) => {
                 if let Some(other) = side(other, hull_b, b) {
-                    let bounds = &boxes[box_of[j as usize] as usize];
+                    let bounds = &boxes[box_of[j as usize] as usize].grown(margins[0]);
                     surface.collide((a, &other, bounds), prediction, (clip, scratch), found);
                 }
                 None
             }
             (other, Solid::Surface(surface)) => {
                 if let Some(other) = side(other, hull_a, a) {
-                    let bounds = &boxes[box_of[i as usize] as usize].moved(offset);
+                    let bounds = boxes[box_of[i as usize] as usize].moved(offset);
+                    let bounds = &bounds.grown(margins[1]);
                     let swapped = |[f, g]: [Feature; 2], w: Witness| found([g, f], w.swapped());
                     surface.collide((b, &other, bounds), prediction, (clip, scratch), swapped);
                 }
@@ -721,6 +729,13 @@ impl Detector {
             }
         }
     }
+}
+
+/// How far two shapes are looked for: the margins of their bodies, which the box of each has already, and how deep they may be in each other.
+#[derive(Clone, Copy)]
+struct Reach {
+    margins: [f64; 2],
+    depth: f64,
 }
 
 /// Points of a surface and another shape at the same place with the same normal become one, that of the least key.

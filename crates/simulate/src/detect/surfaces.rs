@@ -21,7 +21,7 @@ use crate::rotation::{Pose, product};
 
 /// Penetrations below this share of the thinner body are not looked at twice.
 const SHALLOW: f64 = 1e-3;
-/// Triangles that have sunk in by no more than this share of the thinner body are looked for: a triangle that lies behind another one has no box in common with it.
+/// Triangles that have sunk in by this share of the thinner body are looked for at least: a triangle that lies behind another one has no box in common with it.
 const SUNK: f64 = 0.02;
 /// By which share of the depth of a point the surface must be away from it: of faces, and of edges, which are less deep than they separate.
 const NEARER: [f64; 2] = [0.5, 0.05];
@@ -36,11 +36,11 @@ type Pairs = Vec<(u32, u32)>;
 /// A surface with the pose of its body.
 type Placed<'a> = (&'a Surface, &'a Pose);
 
-/// All points where the first surface is nearer to the second than `prediction`.
+/// All points where the first surface is nearer to the second than `prediction`; `depth` is how deep they may be in each other.
 pub(crate) fn collide(
     (a, a_pose): Placed,
     (b, b_pose): Placed,
-    prediction: f64,
+    (prediction, depth): (f64, f64),
     (clip, scratch): (&mut Clip, &mut Scratch),
     mut found: impl FnMut([Feature; 2], Witness),
 ) {
@@ -48,7 +48,7 @@ pub(crate) fn collide(
     let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
     let Scratch { thin, other, pairs, stack, found: list, met, held, .. } = scratch;
     let thin_body = a.thickness.min(b.thickness);
-    let margin = f64::max(prediction, SUNK * thin_body);
+    let margin = prediction.max(depth.max(SUNK * thin_body).min(DEEP * thin_body));
     near(a, b, &relative, margin, (pairs, stack));
     let mut last = u32::MAX;
     let at = |witness: &Witness| witness.place(a_pose, b_pose, [0.0, 0.0, 1.0]).point;

@@ -504,6 +504,13 @@ impl Tools {
         }
     }
 
+    /// Takes the contacts that were pushed behind the last step into the index set, and no others.
+    pub fn insist_on_pushed(&mut self, state: &State) {
+        self.insisted.clear();
+        let pushed = state.memory.contacts.iter().filter(|m| m.pushed);
+        self.insisted.extend(pushed.map(|m| m.key));
+    }
+
     /// Takes contacts of the last attempt that were open into the index set of the next ones; whether there was one.
     pub fn insist(&mut self, pushed: &[Key]) -> bool {
         let before = self.insisted.len();

@@ -79,8 +79,13 @@ impl Remembered {
         rolling::clipped([1, 2].map(|i| scaled * dot(frame[i], self.moment)), mu_r, normal)
     }
 
-    /// Of a contact after a step.
-    pub(super) fn of(near: &Near, axis: u8, row: Option<&Row>, report: &ContactReport) -> Self {
+    /// Of a contact after a step, in which the bodies could come nearer to each other by `prediction`.
+    pub(super) fn of(
+        near: &Near,
+        (axis, prediction): (u8, f64),
+        row: Option<&Row>,
+        report: &ContactReport,
+    ) -> Self {
         Self {
             key: near.key,
             impulse: report.world_impulse(),
@@ -91,6 +96,8 @@ impl Remembered {
             active: row.is_some(),
             stuck: row.is_some_and(|row| sticks(row.r[0], [row.r[1], row.r[2]], row.mu)),
             unrolled: row.is_some_and(|row| sticks(row.r[0], row.moment, row.mu_r)),
+            depth: (prediction - near.place.gap).max(0.0),
+            pushed: false,
         }
     }
 }

@@ -86,7 +86,7 @@ impl Tools {
         let count = self.near.len();
         if let Some(near) = self.near.first() {
             let blank = self.blank(near);
-            memory.contacts.resize(count, Remembered::of(near, 0, None, &blank));
+            memory.contacts.resize(count, Remembered::of(near, (0, 0.0), None, &blank));
             contacts.resize(count, blank);
         } else {
             memory.contacts.clear();
@@ -99,7 +99,9 @@ impl Tools {
                 let near = &this.near[k];
                 let row = this.rows.get(this.row_of[k] as usize);
                 this.report(near, k, contact);
-                *remembered = Remembered::of(near, this.met.axes[k], row, contact);
+                let of = |body: u32| this.margins.get(body as usize).copied().unwrap_or(0.0);
+                let known = (this.met.axes[k], of(near.a) + of(near.b));
+                *remembered = Remembered::of(near, known, row, contact);
             }
         });
         self.contacts = contacts;

@@ -765,10 +765,10 @@ impl<P: Problem, S: Solver<P>> Run<'_, P, S> {
                 if cut_short { self.judge.best_measure } else { measure }
             }
         };
-        // What a solver of another problem ends with is its answer; where a limit stops it, it has none.
+        // What a solver of another problem ends with is its answer; where a limit stops it, or a ray that proves nothing, it has none.
         let answered = match status {
             Status::Solved => true,
-            Status::Limit(_) => false,
+            Status::Limit(_) | Status::NoConclusion(_) => false,
             _ => self.solver.latest(),
         };
         let measure = match counted || answered {

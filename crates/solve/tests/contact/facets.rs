@@ -175,6 +175,58 @@ fn the_inner_polygon_is_inside_the_cone_and_the_cone_inside_the_outer() {
 }
 
 /// Tangents turned by an angle together with the first facet: the same impulses, turned.
+/// Contacts coupled in the normals alone: blocks store zeros, which the linear problem drops.
+#[test]
+fn a_second_problem_of_the_same_pattern_may_have_zeros_in_its_blocks() {
+    let block = |c: usize, k: usize| {
+        let normal = if c == k { 1.1 } else { 0.1 };
+        let tangent = if c == k { 1.0 } else { 0.0 };
+        [[normal, 0.0], [0.0, tangent]]
+    };
+    let rows: Vec<Vec<_>> =
+        (0..4).map(|c| (0..4).map(|k| (k as u32, block(c, k))).collect()).collect();
+    let q = |scale: f64| [-scale, 0.5 * scale].repeat(4);
+    let of = |scale: f64| {
+        FrictionLocal::<2>::new(Bsr::from_rows(4, &rows), q(scale), vec![0.5; 4]).unwrap()
+    };
+    for name in ["facet_outer/lemke", "facet_inner/lemke"] {
+        let mut session = registry::session::<FrictionLocal<2>>(name, &Default::default()).unwrap();
+        let solved = |(outcome, point): (Outcome, LocalPoint)| {
+            assert_eq!(outcome.status, Status::Solved, "{name}");
+            point.r
+        };
+        let first = solved(run(&mut *session, &of(1.0)));
+        let second = solved(run(&mut *session, &of(2.0)));
+        first.iter().zip(&second).for_each(|(a, b)| assert!((2.0 * a - b).abs() < 1e-9, "{name}"));
+    }
+}
+
+/// A ray of the linear problem is no answer to the other.
+#[test]
+fn what_proves_nothing_does_not_replace_a_better_start() {
+    let mut rays = 0;
+    for seed in 0..60 {
+        // Not monotone.
+        let entry =
+            |i: usize, j: usize| (1.3 + seed as f64 + 7.1 * i as f64 + 3.7 * j as f64).sin();
+        let entries = (0..36).map(|k| (k / 6, k % 6, entry(k / 6, k % 6)));
+        let matrix = Bsr::from_csc(&Csc::from_triplets(6, 6, entries).unwrap());
+        let q = (0..6).map(|i| entry(i, 9)).collect();
+        let problem = FrictionLocal::<3>::new(matrix, q, vec![0.6; 2]).unwrap();
+        for name in ["facet_outer/lemke", "facet_inner/lemke"] {
+            let mut session =
+                registry::session::<FrictionLocal<3>>(name, &Default::default()).unwrap();
+            let (outcome, _) = run(&mut *session, &problem);
+            let start = problem.judge(&problem.origin(), 1e-10).unwrap().measure;
+            if matches!(outcome.status, Status::NoConclusion(_)) {
+                rays += 1;
+                assert!(outcome.measure.relative <= start.relative, "{name} {seed}");
+            }
+        }
+    }
+    assert!(rays > 0);
+}
+
 #[test]
 fn the_first_facet_turns_with_the_frame() {
     let turn = 0.7_f64;

@@ -1,6 +1,7 @@
 //! The methods through convex optimisation: their fixed points are those of Gauss–Seidel, whatever solves the convex problems.
 
 use nonsmooth_problem::planted::{Planted, PlantedMix};
+use nonsmooth_problem::{FrictionLocal, Problem};
 use nonsmooth_solve::contact::form::{Access, Linear};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Outcome, Status, settings};
@@ -72,6 +73,26 @@ fn agree<P: Registered + Linear<D>, const D: usize>(make: impl Fn(&Planted) -> P
         }
     }
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+/// What is refilled is scaled and rounded as what is new.
+#[test]
+fn a_session_solves_the_same_problem_to_the_same_bits() {
+    for (name, texts) in [("cadoux", ["inner=clarabel"]), ("tresca", ["inner=conic"])] {
+        for seed in 0..4 {
+            let case = Planted { contacts: 2, dofs: 6, seed, ..Planted::default() };
+            let (problem, _) = case.local::<3>();
+            let settings = settings::from_texts(&texts).unwrap();
+            let mut session = registry::session::<FrictionLocal<3>>(name, &settings).unwrap();
+            let limits = Limits { max_iterations: 200, ..Limits::default() };
+            let mut again = || {
+                let mut point = problem.origin();
+                let done = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+                (done.iterations, point.r.iter().map(|r| r.to_bits()).collect::<Vec<_>>())
+            };
+            assert_eq!(again(), again(), "{name} {seed}");
+        }
+    }
 }
 
 #[test]

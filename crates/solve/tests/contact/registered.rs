@@ -2,7 +2,7 @@
 
 use nonsmooth_linalg::{Bsr, Csc};
 use nonsmooth_problem::planted::Planted;
-use nonsmooth_problem::{FrictionGlobal, FrictionLocal, Problem};
+use nonsmooth_problem::{FrictionGlobal, FrictionLocal, LocalPoint, Problem};
 use nonsmooth_solve::registry::{abouts, session};
 use nonsmooth_solve::settings::{SettingsMap, from_texts};
 use nonsmooth_solve::{Limits, Status};
@@ -111,6 +111,25 @@ fn a_start_that_is_far_too_large_is_no_end() {
 }
 
 /// A contact between two bodies whose motion is given has no block in W: what it pressed with in the step before is taken back where it opens.
+/// Where squares overflow no step of the projection is short enough by its rule.
+#[test]
+fn a_start_whose_squares_overflow_ends() {
+    let block = [[1e6, 0.0, 0.0], [0.0, 1e6, 0.0], [0.0, 0.0, 1e6]];
+    let w = Bsr::from_rows(1, &[vec![(0, block)]]);
+    let problem = FrictionLocal::<3>::new(w, vec![-1.0, 1.0, 0.0], vec![0.5]).unwrap();
+    let settings = from_texts(&["local=projection_iterated"]).unwrap();
+    for solver in ["nsgs", "nsgs_colored"] {
+        for scale in [1e100, 1e149, 1e154, 1e200, 1e300] {
+            let mut session = session::<FrictionLocal<3>>(solver, &settings).unwrap();
+            let r = [1.0, -3.0, 2.0].map(|x| scale * x).to_vec();
+            let mut point = LocalPoint { r, lambda: vec![] };
+            let limits = Limits { max_iterations: 50, ..Limits::default() };
+            let outcome = session.solve(&problem, &mut point, &limits, &mut |_| {}).unwrap();
+            assert!(point.r.iter().all(|r| r.is_finite()), "{solver} {scale:e} {outcome:?}");
+        }
+    }
+}
+
 #[test]
 fn a_contact_without_a_block_does_not_keep_its_impulse() {
     let w = Csc::from_triplets(6, 6, (0..3).map(|i| (i, i, 1.0))).unwrap();

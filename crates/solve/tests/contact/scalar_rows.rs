@@ -47,6 +47,23 @@ fn planted_problems_are_solved_in_every_form() {
     }
 }
 
+/// A row that no impulse moves, at 1: its impulse is at its lower bound.
+#[test]
+fn rows_that_nothing_moves_go_to_their_bounds() {
+    for g in [0.0, 1e-170, 1e-16, 1e-9] {
+        let h = Csc::from_triplets(1, 2, [(0, 0, 1.0)].into_iter()).unwrap();
+        let m = Csc::diagonal(&[1.0]);
+        let mut problem =
+            FrictionGlobal::<2>::new(m, h, vec![2.0], vec![0.0; 2], vec![0.0]).unwrap();
+        let along = Csc::from_triplets(1, 1, [(0, 0, g)].into_iter()).unwrap();
+        let bounds = Bounds { lower: vec![-1.0], upper: vec![1.0] };
+        problem.rows = Some(RowsGlobal { G: along, b: vec![1.0], bounds });
+        for solver in ["auto", "nsgs", "condense/nsgs"] {
+            assert_eq!(solved(&problem, solver).lambda, [-1.0], "{solver} {g:e}");
+        }
+    }
+}
+
 /// A motor holds a part 2²⁷ times lighter than the body that the contact carries: sweeps think that they have arrived, relative to what the part would do without the motor.
 #[test]
 fn what_a_motor_holds_is_no_measure_of_a_contact() {

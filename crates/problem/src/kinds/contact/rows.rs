@@ -65,9 +65,29 @@ impl Bounds {
         c.min(w * (lambda - l)).max(w * (lambda - u))
     }
 
+    /// How far λ_j and the velocity c, whose terms have this size and which is known but for `rounding`, are from the law of the row, and the size that this is compared with. Only c is rounded: where it is
+    /// more than that, λ_j is wrong by its way to the bound, however little the row moves.
+    pub(crate) fn violation(
+        &self,
+        row: usize,
+        (lambda, c): (f64, f64),
+        w: f64,
+        (size, rounding): (f64, f64),
+    ) -> (f64, f64) {
+        let c = match rounding {
+            none if !none.is_finite() => c,
+            _ if c.abs() <= rounding => 0.0,
+            _ => c - rounding.copysign(c),
+        };
+        if self.is_free(row) {
+            return (c, size);
+        }
+        (self.residual(row, lambda, c, w), self.size_of(row, (lambda, c), w, size))
+    }
+
     /// What [`residual`](Self::residual) is compared with, of a velocity whose terms have this size. An impulse that is not on the bound that it has to be on is wrong by its part of the
     /// bounds, however fast the row moves: a motor that never reaches its velocity.
-    pub(crate) fn size_of(&self, row: usize, (lambda, c): (f64, f64), w: f64, size: f64) -> f64 {
+    fn size_of(&self, row: usize, (lambda, c): (f64, f64), w: f64, size: f64) -> f64 {
         let bounds = self.of(row).map(|b| if b.is_finite() { b.abs() } else { 0.0 });
         let stated = bounds[0].max(bounds[1]);
         // The impulse is no term of c, but may be all there is.

@@ -2,8 +2,8 @@
 
 use nonsmooth_scenes::Rotation;
 use nonsmooth_simulate::{
-    Activation, Body, Control, Force, Impact, Law, MoreauJean, Part, Shape, SimulateError,
-    Simulation, State, StepReport, StepStatus, World, Wrenches,
+    Activation, Body, Control, Force, Geometry, Impact, Law, MoreauJean, Part, Shape,
+    SimulateError, Simulation, State, StepReport, StepStatus, World, Wrenches,
 };
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -311,4 +311,36 @@ fn a_compliance_leaves_no_room_for_restitution() {
     world.comply(0, 0, nonsmooth_simulate::Compliance { stiffness: 1e4, damping: 0.0 });
     let said = world.validate().unwrap_err().to_string();
     assert!(said.contains("pairs[default, default].e: expected 0"), "{said}");
+}
+
+/// A box that tumbles on a plane: contacts that open while others press the body have u_θ ≥ 0 too, and nothing gives energy, also without a rebound.
+#[test]
+fn no_contact_gives_energy_by_fremonds_law() {
+    let turned = Rotation([
+        -0.14594633953046865,
+        0.6310772097431187,
+        -0.03926664017548115,
+        -0.7608543568185873,
+    ]);
+    let (v, omega) = ([-1.23, -0.59, 0.22], [-10.13, -3.0, -1.78]);
+    for e in [0.0, 0.5] {
+        for h in [2e-3, 1e-3, 5e-4] {
+            let mut world = world(3.0, e);
+            world.add(Body::floor());
+            let body = block([0.1, 0.12, 0.08]).at([0.0, 0.0, 0.25]).turned(turned);
+            world.add(body.moving(v, omega));
+            let scheme = MoreauJean {
+                impact: Impact::Fremond,
+                geometry: Geometry::Frozen,
+                ..MoreauJean::default()
+            };
+            let mut simulation = Simulation::new(world, scheme).unwrap();
+            while simulation.state().t < 0.8 {
+                let step = simulation.step(h).unwrap();
+                assert_eq!(step.status, StepStatus::Solved);
+                let given = step.energy.normal + step.energy.tangential;
+                assert!(given < 1e-9, "{e} {h}: {given:e} J at {}", step.t);
+            }
+        }
+    }
 }

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use nonsmooth_scenes::{Polyhedron, Rotation};
-use nonsmooth_simulate::{Body, BodyId, Mesh, Simulation, World};
+use nonsmooth_simulate::{Body, BodyId, Mesh, Motion, Simulation, World};
 
-use crate::verification::{G, near, run, simulation, v, world, x};
+use crate::verification::{G, ball, block, near, run, simulation, v, weightless, world, x};
 
 /// A closed mesh of 1000 kg/m³.
 fn solid(mesh: Mesh) -> Body {
@@ -71,6 +71,73 @@ fn carried(s: &Simulation, a: BodyId, b: BodyId, m: f64, h: f64) -> f64 {
 fn keys(s: &Simulation) -> BTreeSet<[u32; 4]> {
     let active = s.contacts().iter().filter(|c| c.active);
     active.map(|c| [c.key.shape_a, c.key.shape_b, c.key.feature_a, c.key.feature_b]).collect()
+}
+
+/// Crates with flush sides that fall on each other in coarse steps, and end far deeper in each other than triangles are looked for at rest.
+#[test]
+fn what_has_sunk_in_an_impact_is_met_again() {
+    for (h, drops) in [(2e-3, [1.3, 1.6, 2.0]), (5e-3, [0.2, 0.5, 1.1])] {
+        for (drop, off, upper) in drops
+            .into_iter()
+            .flat_map(|d| [(d, 0.0, [0.2; 3]), (d, 0.02, [0.2; 3]), (d, 0.0, [0.1, 0.2, 0.2])])
+        {
+            let end = |shape: &dyn Fn([f64; 3]) -> Body| {
+                let mut world = world(0.5, 0.0);
+                world.add(Body::floor());
+                world.add(shape([0.2; 3]).at([0.0, 0.0, 0.2]));
+                let top = world.add(shape(upper).at([off, 0.0, 0.6 + drop]));
+                let mut simulation = simulation(world);
+                run(&mut simulation, 1.2, h);
+                x(&simulation, top)[2]
+            };
+            let mesh = end(&|half| solid(crate_of(half)));
+            let as_box = end(&block);
+            assert!((mesh - as_box).abs() < 0.01, "{h} {drop} {off}: {mesh} {as_box}");
+        }
+    }
+}
+
+/// Overlaps up to a quarter of the thinner body are seen before the first step, and refused.
+#[test]
+fn crates_that_overlap_are_refused() {
+    for depth in [0.002, 0.0079, 0.0081, 0.02, 0.04, 0.09] {
+        for off in [0.0, 0.03] {
+            let mut world = world(0.5, 0.0);
+            world.add(solid(crate_of([0.2; 3])).at([0.0, 0.0, 0.2]));
+            world.add(solid(crate_of([0.2; 3])).at([off, 0.0, 0.6 - depth]));
+            let found = Simulation::new(world, Default::default());
+            assert!(found.is_err(), "{depth} {off}");
+        }
+    }
+}
+
+/// A crate at 10 m/s towards a ball at rest is met in the step in which its forecast closes the gap, as a box is.
+#[test]
+fn a_mesh_that_moves_is_met_in_time() {
+    let (h, speed) = (1e-3, 10.0);
+    for driven in [false, true] {
+        for gap in [1e-3, 3e-3, 4.5e-3, 7e-3, 9.5e-3, 12e-3] {
+            let gaps = |crate_: Body| {
+                let mut world = weightless(0.0, 0.0);
+                let ball = world.add(ball(0.25));
+                let mut body = crate_.at([0.45 + gap, 0.0, 0.0]);
+                match driven {
+                    true => body.motion = Motion::Uniform { velocity: [-speed, 0.0, 0.0] },
+                    false => body = body.moving([-speed, 0.0, 0.0], [0.0; 3]),
+                }
+                let body = world.add(body);
+                let mut simulation = simulation(world);
+                let mut all = vec![];
+                for _ in 0..5 {
+                    simulation.step(h).unwrap();
+                    all.push(x(&simulation, body)[0] - x(&simulation, ball)[0]);
+                }
+                all
+            };
+            let (mesh, as_box) = (gaps(solid(crate_of([0.2; 3]))), gaps(block([0.2; 3])));
+            mesh.iter().zip(&as_box).for_each(|(a, b)| near(*a, *b, 1e-9));
+        }
+    }
 }
 
 #[test]

@@ -141,7 +141,8 @@ impl Entries {
         let (mut next, mut same) = (self.places.iter(), true);
         state(&mut |i, j, x| match next.next() {
             Some(&k) if same && j + 1 < pointers.len() => {
-                same = rows[k] == i && (pointers[j]..pointers[j + 1]).contains(&k);
+                // A problem drops entries that are zero.
+                same = rows.get(k) == Some(&i) && (pointers[j]..pointers[j + 1]).contains(&k);
                 if same {
                     values[k] += x;
                 }

@@ -101,6 +101,8 @@ impl<const D: usize> Clarabel<D> {
         )
         .expect("the matrices fit each other");
         solver.set_termination_callback(|_: &_| budget::over());
+        // Rounded as what is refilled is, so that the same data have the same answer again.
+        let _ = solver.update_P(&quadratic).and_then(|()| solver.update_A(&constraints));
         Ok(Self { solver, layout, quadratic, constraints, cost, bound, w, speed: 1.0 })
     }
 

@@ -383,15 +383,10 @@ impl GlobalGauge {
             let shares = rows.values().zip(rows.sizes()).enumerate().map(|(j, (sum, &size))| {
                 let (at, values) = b.G.column(j);
                 let weight: f64 = at.iter().zip(values).map(|(&i, g)| g.abs() / unit(i)).sum();
-                let (left, size) = if b.bounds.is_free(j) {
-                    (sum, size)
-                } else {
-                    let w = of_impulse(problem, &b.G, j);
-                    let lambda = point.lambda[j];
-                    let left = b.bounds.residual(j, lambda, sum, w);
-                    (left, b.bounds.size_of(j, (lambda, sum), w, size))
-                };
-                law.loads.excused(problem.contacts() + j, left, size, typical * weight)
+                let (lambda, w) = (point.lambda[j], of_impulse(problem, &b.G, j));
+                law.loads.excused(problem.contacts() + j, typical * weight, |rounding| {
+                    b.bounds.violation(j, (lambda, sum), w, (size, rounding))
+                })
             });
             measure.bilateral = Some(worst(shares));
         }
@@ -436,10 +431,13 @@ impl GlobalGauge {
     }
 }
 
-/// The velocity that a unit impulse of row j makes of itself, as if M were diagonal: a unit.
+/// The velocity that a unit impulse of row j makes of itself, as if M were diagonal: a unit; 1 of a row that no impulse moves.
 fn of_impulse<const D: usize, L: Law<D>>(problem: &FrictionGlobal<D, L>, g: &Csc, j: usize) -> f64 {
     let (rows, values) = g.column(j);
-    rows.iter().zip(values).map(|(&i, g)| (g / unit(problem.M.get(i, i))).powi(2)).sum()
+    match rows.iter().zip(values).map(|(&i, g)| (g / unit(problem.M.get(i, i))).powi(2)).sum() {
+        w if w > 0.0 => w,
+        _ => 1.0,
+    }
 }
 
 /// What the rounding of r to doubles alone makes of the residual, in the root mean square: by one response to

@@ -23,14 +23,11 @@ pub(crate) fn unit(d: f64) -> f64 {
     }
 }
 
-/// The largest ratio of violation to size, beyond what each is excused for; infinite if any is NaN.
-pub(crate) fn worst(shares: impl Iterator<Item = (f64, f64, f64)>) -> f64 {
-    shares.fold(0.0, |worst: f64, (violation, size, excuse)| {
-        match over((violation.abs() - excuse).max(0.0), size) {
-            _ if violation.is_nan() => f64::INFINITY,
-            share if share.is_nan() => f64::INFINITY,
-            share => worst.max(share),
-        }
+/// The largest ratio of violation to size; infinite if any is NaN.
+pub(crate) fn worst(shares: impl Iterator<Item = (f64, f64)>) -> f64 {
+    shares.fold(0.0, |worst: f64, (violation, size)| match over(violation.abs(), size) {
+        share if share.is_nan() => f64::INFINITY,
+        share => worst.max(share),
     })
 }
 

@@ -109,13 +109,20 @@ pub(crate) const ROUNDING: f64 = 16.0 * f64::EPSILON;
 const REACH: f64 = 1e5;
 
 impl Loads {
-    /// The violation, the size it is compared with and the violation that is excused of an equation of row i: its terms are no larger than the loads
-    /// make them, nor is the rounding of `typical` terms.
-    pub(crate) fn excused(&self, i: usize, sum: f64, size: f64, typical: f64) -> (f64, f64, f64) {
-        match self.reaching(i) {
-            load if load > 0.0 => (sum, size.min(load), ROUNDING * typical.min(REACH * load)),
-            _ => (sum, size, ROUNDING * typical),
-        }
+    /// The violation of an equation of row i beyond what is excused, and the size that it is compared with: its terms are no larger than the loads make them, nor is the rounding of
+    /// `typical` terms. `violation` makes both of that rounding.
+    pub(crate) fn excused(
+        &self,
+        i: usize,
+        typical: f64,
+        violation: impl FnOnce(f64) -> (f64, f64),
+    ) -> (f64, f64) {
+        let load = match self.reaching(i) {
+            load if load > 0.0 => load,
+            _ => f64::INFINITY,
+        };
+        let (violation, size) = violation(ROUNDING * typical.min(REACH * load));
+        (violation, size.min(load))
     }
 }
 

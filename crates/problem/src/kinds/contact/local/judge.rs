@@ -263,12 +263,9 @@ impl LocalGauge {
         let shares = self.rows.values().zip(self.rows.sizes()).zip(&*excuse).enumerate();
         let share = worst(shares.map(|(j, ((sum, &size), excuse))| {
             let (lambda, w) = (point.lambda[j], unit(j).powi(2));
-            let left = bounds.residual(j, lambda, sum, w);
-            let size = match bounds.is_free(j) {
-                true => size,
-                false => bounds.size_of(j, (lambda, sum), w, size),
-            };
-            self.law.loads.excused(nc + j, left, size, *excuse)
+            self.law.loads.excused(nc + j, *excuse, |rounding| {
+                bounds.violation(j, (lambda, sum), w, (size, rounding))
+            })
         }));
         self.sizes.truncate(point.r.len());
         Some(share)

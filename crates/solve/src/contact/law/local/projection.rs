@@ -85,8 +85,8 @@ impl<L: ContactLaw<D>, const D: usize> LocalSolver<D, L> for ProjectionIterated 
                 let next = projected(&r, &f, *rho, law);
                 let f_next = modified_velocity(w, q, law, &next);
                 let ratio = *rho * distance(&f, &f_next) / distance(&r, &next);
-                // A NaN (no movement) is accepted, and ends the outer loop below.
-                if ratio.is_nan() || ratio <= 0.9 {
+                // A NaN (no movement) is accepted, and ends the outer loop below; so is what no shorter step would mend, where numbers are too large for their squares.
+                if !(ratio > 0.9 && ratio.is_finite() && *rho > f64::MIN_POSITIVE) {
                     break (next, f_next, ratio);
                 }
                 *rho *= 2.0 / 3.0;
