@@ -106,12 +106,16 @@ fn a_motor_reaches_its_speed_saturates_or_stalls() {
     }
 }
 
-/// A row that its own impulse moves by less than velocities are rounded: it moves at 1 whatever the impulse, which therefore is at its lower bound.
+/// A row that its own impulse moves by less than velocities are rounded: it moves at 1 whatever the impulse, which therefore is at its lower bound. Bounds say how large impulses are; without one that is not zero,
+/// so does what the row moves by, if it does at all.
 #[test]
 fn a_row_that_no_impulse_moves_has_its_impulse_at_the_bound() {
     let column = |g: f64| Csc::from_triplets(2, 1, [(1, 0, g)].into_iter()).unwrap();
     for g in [0.0, 1e-170, 1e-30, 1e-17, 1e-16, 1e-15, 1e-14, 1e-12] {
         for (bounds, right) in [([-1.0, 1.0], -1.0), ([0.0, f64::INFINITY], 0.0)] {
+            if right == 0.0 && g * g > 0.0 {
+                continue;
+            }
             let bounds = Bounds { lower: vec![bounds[0]], upper: vec![bounds[1]] };
             let mut global = motor(1.0);
             global.f = vec![0.0, -2.0];

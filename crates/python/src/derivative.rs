@@ -49,11 +49,10 @@ impl Derivative {
         let point = point(&file.problem, "answer", answer)?;
         file.problem.validate_point(&point).map_err(mistake)?;
         // F may be a function of Python, and a factorisation may take long.
-        let watcher = Arc::new(Watcher::default());
-        let watching = problem.faults.watch(&watcher);
+        let watcher = Arc::new(Watcher::of(py, file.problem.unknowns())?);
         let cancel = Some(watcher.stop.clone());
         let limits = Limits { tolerance, time_limit, cancel, ..Limits::default() };
-        let made = py.detach(|| {
+        let made = problem.watched(py, &watcher, || {
             let mut asked = Instant::now();
             let tick = || {
                 if asked.elapsed() >= TICK {
@@ -62,11 +61,7 @@ impl Derivative {
                 }
             };
             derivative_within(&file.problem, &point, &limits, tick)
-        });
-        drop(watching);
-        if let Some(fault) = watcher.fault() {
-            return Err(fault);
-        }
+        })?;
         made.map(Self).map_err(mistake)
     }
 

@@ -10,6 +10,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use nonsmooth_linalg::{Csc, Matrix};
 use nonsmooth_problem::field::{Closures, Differences, Field, Pattern, is_tentative};
+use nonsmooth_solve::guard;
 use numpy::PyArray1;
 use pyo3::exceptions::{PyException, PyMemoryError, PyNameError, PyRecursionError};
 use pyo3::prelude::*;
@@ -52,8 +53,11 @@ fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Watcher {
-    /// Of a solve on another thread, for the present context.
-    pub fn elsewhere(py: Python<'_>) -> PyResult<Self> {
+    /// Of a problem of so many unknowns: a large one is solved on another thread, for which the present context is kept.
+    pub fn of(py: Python<'_>, unknowns: usize) -> PyResult<Self> {
+        if unknowns <= guard::SMALL {
+            return Ok(Self::default());
+        }
         let context = py.import("contextvars")?.call_method0("copy_context")?.unbind();
         Ok(Self { context: Some(context), ..Self::default() })
     }
@@ -122,14 +126,15 @@ impl Faults {
         Watching(self, watcher.clone())
     }
 
-    /// The solve that asks now; all where that is not known, as on threads of the library's own.
+    /// The solve that asks now. On threads of the library's own it is not known: all that are on other threads.
     fn asking(&self) -> Vec<Arc<Watcher>> {
         let mine = SOLVE.with_borrow(Clone::clone);
         let all = locked(&self.0);
-        match mine.filter(|mine| all.iter().any(|one| Arc::ptr_eq(one, mine))) {
-            Some(mine) => vec![mine],
-            None => all.clone(),
+        if let Some(mine) = mine.filter(|mine| all.iter().any(|one| Arc::ptr_eq(one, mine))) {
+            return vec![mine];
         }
+        let elsewhere: Vec<_> = all.iter().filter(|one| one.context.is_some()).cloned().collect();
+        if elsewhere.is_empty() { all.clone() } else { elsewhere }
     }
 }
 

@@ -52,6 +52,8 @@ mod _nonsmooth {
     #[pymodule_export]
     use crate::derivative::Derivative;
     #[pymodule_export]
+    use crate::numbers::reals;
+    #[pymodule_export]
     use crate::problem::{Problem, kinds};
     #[pymodule_export]
     use crate::registry::{check, offers};

@@ -93,7 +93,9 @@ pub fn first_line(text: &str) -> String {
     text.lines().next().unwrap_or_default().to_owned()
 }
 
-fn reals<'py>(place: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+/// An array of real numbers, nothing of which is masked.
+#[pyfunction]
+pub fn reals<'py>(place: &str, given: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
     array(place, given, "fiub", "an array of real numbers")
 }
 

@@ -167,9 +167,7 @@ impl<'a> Parts for Given<'a, '_> {
 
     fn expressions(&mut self, name: &'static str) -> Result<Expressions, ProblemError> {
         let read = |given: &Bound<'_, PyAny>| {
-            let texts: Vec<String> = given.extract().map_err(|_| {
-                expected(name, "a function, or a list of expressions", type_name(given))
-            })?;
+            let texts: Vec<String> = given.extract().map_err(|_| no_expressions(name, given))?;
             Expressions::parse(&texts, &[]).map_err(mistake)
         };
         let old = |part: &Part<'a>| match part {
@@ -190,9 +188,18 @@ impl<'a> Parts for Given<'a, '_> {
 
 const WHOLE: &str = "a whole number of at least 0";
 
-/// An object as Python shows it.
+/// An object as Python shows it, in a line.
 fn shown_as(given: &Bound<'_, PyAny>) -> String {
-    given.repr().map_or_else(|e| e.to_string(), |r| r.to_string())
+    numbers::first_line(&given.repr().map_or_else(|e| e.to_string(), |r| r.to_string()))
+}
+
+/// Why something is no list of expressions: the first entry that is none, if it is a list.
+fn no_expressions(name: &str, given: &Bound<'_, PyAny>) -> PyErr {
+    let entries = given.cast::<PyList>().ok().into_iter().flatten();
+    match entries.enumerate().find(|(_, entry)| entry.extract::<String>().is_err()) {
+        Some((k, entry)) => expected(&format!("{name}[{k}]"), "an expression", shown_as(&entry)),
+        None => expected(name, "a function, or a list of expressions", type_name(given)),
+    }
 }
 
 /// The name of an object's type.
@@ -223,7 +230,12 @@ fn set_within(place: &str, given: &Bound<'_, PyAny>, left: usize) -> PyResult<Se
     let set = match kind.as_str() {
         "box" => Set::Box { lower: vector("lower")?, upper: vector("upper")? },
         "polyhedron" => {
-            Set::Polyhedron { A: matrix("A")?, b: vector("b")?, C: matrix("C")?, d: vector("d")? }
+            let a = matrix("A")?;
+            let c = match part("C")? {
+                none if none.is_none() => Csc::zeros(0, a.ncols()),
+                given => numbers::csc(&at("C"), &given)?,
+            };
+            Set::Polyhedron { A: a, b: vector("b")?, C: c, d: vector("d")? }
         }
         "ball" => {
             let (centre, radius) = (vector("centre")?, part("radius")?);
@@ -240,7 +252,10 @@ fn set_within(place: &str, given: &Bound<'_, PyAny>, left: usize) -> PyResult<Se
                 let what = format!("products at most {DEEPEST} deep");
                 expected("set", &what, "a deeper one")
             })?;
-            let inner = part("sets")?.try_iter()?;
+            let given = part("sets")?;
+            let inner = given
+                .try_iter()
+                .map_err(|_| expected(&at("sets"), "a list of sets", type_name(&given)))?;
             let each = |(k, one): (usize, PyResult<Bound<'_, PyAny>>)| {
                 set_within(&format!("{place}[{k}]"), &one?, left)
             };

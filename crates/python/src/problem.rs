@@ -4,8 +4,10 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use nonsmooth_io::{ProblemFile, StoredPoint};
+use nonsmooth_linalg::{Csc, Matrix};
+use nonsmooth_problem::check::{Judged as _, VerdictOf};
 use nonsmooth_problem::{
-    AnyPoint, AnyProblem, Complementarity, Kind, Mcp, OfAny, OfAnyPoint, Problem as _,
+    AnyPoint, AnyProblem, Complementarity, Kind, Mcp, Mlcp, OfAny, OfAnyPoint, Part, Problem as _,
     ProblemError, Shape, Stated, Vi, each_kind, with_complementarity, with_friction,
 };
 use nonsmooth_solve::{Kept, Limits};
@@ -13,7 +15,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use pyo3::{PyTraverseError, PyVisit};
 
-use crate::function::{self, Faults, Functions};
+use crate::function::{self, Faults, Functions, Watcher};
 use crate::parts::{Given, Shown, put};
 use crate::{contact, expected, mistake, numbers};
 
@@ -58,6 +60,59 @@ impl Problem {
     /// Brings it back.
     pub fn put_kept(&self, kept: Kept) {
         *self.kept.lock().unwrap_or_else(PoisonError::into_inner) = kept;
+    }
+
+    /// Does what may call its functions, with Python let go of: what they raise is raised here, and ends nothing else.
+    pub fn watched<T: Send>(
+        &self,
+        py: Python<'_>,
+        watcher: &Arc<Watcher>,
+        task: impl FnOnce() -> T + Send,
+    ) -> PyResult<T> {
+        let watching = self.faults.watch(watcher);
+        let done = py.detach(|| watcher.at_work(task));
+        drop(watching);
+        watcher.fault().map_or(Ok(done), Err)
+    }
+
+    /// The judge's word on a point.
+    fn judged(
+        &self,
+        py: Python<'_>,
+        problem: &AnyProblem,
+        point: &AnyPoint,
+        tolerance: f64,
+    ) -> PyResult<VerdictOf<AnyProblem>> {
+        self.watched(py, &Arc::default(), || problem.judge(point, tolerance))?.map_err(mistake)
+    }
+
+    /// As [`point`]; velocities that are not given follow from the impulses.
+    fn whole_point(
+        &self,
+        problem: &AnyProblem,
+        place: &str,
+        given: &Bound<'_, PyAny>,
+    ) -> PyResult<AnyPoint> {
+        fn follow<P: nonsmooth_problem::Problem<Point: OfAnyPoint>>(
+            problem: &P,
+            point: &mut AnyPoint,
+        ) -> Result<(), ProblemError> {
+            if let Some(point) = P::Point::of_mut(point) {
+                problem.validate_point(point)?;
+                let mut gauge = problem.gauge()?;
+                problem.measure(point, &mut gauge);
+                problem.follow_impulses(point, &mut gauge);
+            }
+            Ok(())
+        }
+        let mut point = self::point(problem, place, given)?;
+        let whole = given.cast::<crate::solve::Answer>().is_ok()
+            || given.cast::<PyDict>().is_ok_and(|parts| parts.contains("v").unwrap_or(false));
+        if let (AnyProblem::Friction(contacts), false) = (problem, whole) {
+            let follow = || with_friction!(contacts, p => follow(p, &mut point));
+            self.watched(given.py(), &Arc::default(), follow)?.map_err(mistake)?;
+        }
+        Ok(point)
     }
 }
 
@@ -187,9 +242,12 @@ fn shown(problem: &AnyProblem) -> Vec<(&'static str, Shown<'_>)> {
 
 /// The same problem with other parts; a function of Python stays as it is.
 fn changed(problem: &AnyProblem, parts: &Bound<'_, PyDict>) -> PyResult<AnyProblem> {
-    fn rebuilt<P: Stated>(problem: &P, parts: &Bound<'_, PyDict>) -> PyResult<P> {
-        let old = problem.parts();
-        let mut given = Given::over(parts, &old);
+    fn rebuilt<P: Stated>(
+        _: &P,
+        old: &[(&'static str, Part<'_>)],
+        parts: &Bound<'_, PyDict>,
+    ) -> PyResult<P> {
+        let mut given = Given::over(parts, old);
         let made = P::from_parts(&mut given);
         given.made(made, &letters(P::PARTS))
     }
@@ -218,10 +276,42 @@ fn changed(problem: &AnyProblem, parts: &Bound<'_, PyDict>) -> PyResult<AnyProbl
             given.made(valid, &["set", "start"])?;
             Ok(other.into())
         }
+        AnyProblem::Complementarity(Complementarity::Mlcp(p)) if is_by_blocks(parts) => {
+            let (matrices, (a, b)) = (blocks(p), p.q.split_at(p.equalities));
+            let mut old = vec![("a", Part::Vector(a)), ("b", Part::Vector(b))];
+            old.extend(matrices.iter().map(|(name, block)| (*name, Part::Matrix(block))));
+            rebuilt(p, &old, parts).map(Into::into)
+        }
         AnyProblem::Complementarity(stated) => {
-            with_complementarity!(stated, p => rebuilt(p, parts).map(Into::into))
+            with_complementarity!(stated, p => rebuilt(p, &p.parts(), parts).map(Into::into))
         }
     }
+}
+
+/// Whether blocks of a mixed problem are given.
+fn is_by_blocks(parts: &Bound<'_, PyDict>) -> bool {
+    let given = Given::new(parts);
+    ["A", "B", "C", "D", "a", "b"].iter().any(|name| given.is_given(name))
+}
+
+/// The blocks of the matrix of a mixed problem, sparse ones of a sparse matrix, in one pass.
+fn blocks(p: &Mlcp) -> Vec<(&'static str, Matrix)> {
+    let Matrix::Sparse(whole) = &p.M else {
+        return p.blocks().into_iter().map(|(name, block)| (name, block.into())).collect();
+    };
+    let (rows, columns, pairs) = (p.equalities, p.free, p.pairs());
+    let mut entries = [const { vec![] }; 4];
+    for (i, j, x) in whole.triplets() {
+        let (below, beyond) = (i >= rows, j >= columns);
+        let block = 2 * usize::from(below) + usize::from(beyond);
+        entries[block].push((i - rows * usize::from(below), j - columns * usize::from(beyond), x));
+    }
+    let shapes =
+        [("A", rows, columns), ("C", rows, pairs), ("D", pairs, columns), ("B", pairs, pairs)];
+    let made = shapes.into_iter().zip(entries).filter_map(|((name, m, n), entries)| {
+        Some((name, Csc::from_triplets(m, n, entries.into_iter()).ok()?.into()))
+    });
+    made.collect()
 }
 
 #[pymethods]
@@ -261,22 +351,21 @@ impl Problem {
         path: PathBuf,
         answer: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
-        use nonsmooth_problem::check::Judged;
-        let mut file = (*self.file()).clone();
+        let now = self.file();
+        let mut file = (*now).clone();
         if let Some(given) = answer {
-            let point = whole_point(&file.problem, "answer", given)?;
+            let point = self.whole_point(&file.problem, "answer", given)?;
             file.problem.validate_point(&point).map_err(mistake)?;
-            let verdict = match given.cast::<crate::solve::Answer>() {
-                Ok(answer) => answer.get().answer.verdict.clone(),
-                Err(_) => {
-                    let tolerance = Limits::default().tolerance;
-                    py.detach(|| file.problem.judge(&point, tolerance)).map_err(mistake)?
-                }
+            // The judge's word is on the problem that was solved: after an update, or of another problem, it is another.
+            let solved = given.cast::<crate::solve::Answer>().ok().map(|answer| answer.get());
+            let verdict = match solved.filter(|answer| Arc::ptr_eq(&answer.file, &now)) {
+                Some(answer) => answer.answer.verdict.clone(),
+                None => self.judged(py, &file.problem, &point, Limits::default().tolerance)?,
             };
             let stored = StoredPoint::new(&file.problem, point, verdict.velocity);
             file.solution = Some(StoredPoint { statuses: verdict.statuses, ..stored });
         }
-        py.detach(|| file.write(path)).map_err(mistake)
+        self.watched(py, &Arc::default(), || file.write(path))?.map_err(mistake)
     }
 
     /// Puts other parts in the place of those that are there. The session that is kept goes on.
@@ -284,11 +373,15 @@ impl Problem {
         let old = self.file();
         let problem = changed(&old.problem, parts)?;
         let ProblemFile { info, drawing, .. } = &*old;
-        let file = ProblemFile {
+        let mut file = ProblemFile {
             info: info.clone(),
             drawing: drawing.clone(),
             ..ProblemFile::new(problem)
         };
+        // Names are those of all variables.
+        if file.problem.unknowns() != old.problem.unknowns() {
+            file.info.names.clear();
+        }
         *self.file.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(file);
         Ok(())
     }
@@ -366,8 +459,10 @@ impl Problem {
     fn solution<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let file = self.file();
         let Some(stored) = &file.solution else { return Ok(None) };
-        let partner = stored.partner.clone();
-        let partner = partner.unwrap_or_else(|| file.problem.partner(&stored.point));
+        let partner = match &stored.partner {
+            Some(partner) => partner.clone(),
+            None => self.watched(py, &Arc::default(), || file.problem.partner(&stored.point))?,
+        };
         crate::solve::arrays(py, file.problem.point_parts(&stored.point, &partner)).map(Some)
     }
 
@@ -388,36 +483,12 @@ impl Problem {
         point: &Bound<'py, PyAny>,
         tolerance: f64,
     ) -> PyResult<Bound<'py, PyAny>> {
-        use nonsmooth_problem::check::Judged;
         let file = self.file();
-        let point = whole_point(&file.problem, "point", point)?;
+        let point = self.whole_point(&file.problem, "point", point)?;
         Limits { tolerance, ..Limits::default() }.validate().map_err(mistake)?;
-        let verdict = py.detach(|| file.problem.judge(&point, tolerance)).map_err(mistake)?;
+        let verdict = self.judged(py, &file.problem, &point, tolerance)?;
         Ok(pythonize::pythonize(py, &verdict)?)
     }
-}
-
-/// As [`point`]; velocities that are not given follow from the impulses.
-fn whole_point(problem: &AnyProblem, place: &str, given: &Bound<'_, PyAny>) -> PyResult<AnyPoint> {
-    fn follow<P: nonsmooth_problem::Problem<Point: OfAnyPoint>>(
-        problem: &P,
-        point: &mut AnyPoint,
-    ) -> Result<(), ProblemError> {
-        if let Some(point) = P::Point::of_mut(point) {
-            problem.validate_point(point)?;
-            let mut gauge = problem.gauge()?;
-            problem.measure(point, &mut gauge);
-            problem.follow_impulses(point, &mut gauge);
-        }
-        Ok(())
-    }
-    let mut point = self::point(problem, place, given)?;
-    let whole = given.cast::<crate::solve::Answer>().is_ok()
-        || given.cast::<PyDict>().is_ok_and(|parts| parts.contains("v").unwrap_or(false));
-    if let (AnyProblem::Friction(contacts), false) = (problem, whole) {
-        with_friction!(contacts, p => follow(p, &mut point)).map_err(mistake)?;
-    }
-    Ok(point)
 }
 
 /// A point of the problem: of an answer, of its parts by their names, or of the array that it is made of: z or x, of contacts the impulses r.

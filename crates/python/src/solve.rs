@@ -122,7 +122,7 @@ pub fn solve(
     let problem = problem.get();
     let file = problem.file();
     let small = file.problem.unknowns() <= guard::SMALL;
-    let watcher = Arc::new(if small { Watcher::default() } else { Watcher::elsewhere(py)? });
+    let watcher = Arc::new(Watcher::of(py, file.problem.unknowns())?);
     // As the command line has it: a limit on time is the only one where there is one.
     let most = if time_limit.is_some() { usize::MAX } else { Limits::default().max_iterations };
     let limits = Limits {
@@ -152,11 +152,11 @@ pub fn solve(
     drop(watching);
     problem.put_kept(kept);
     let functions = problem.functions(py);
+    let made = |answer| Answer { answer, file, functions, tolerance: tol };
     if let Some(fault) = watcher.fault() {
         // What Ctrl-C ended is not lost.
         if let (true, Ok(answer)) = (fault.is_instance_of::<PyKeyboardInterrupt>(py), solved) {
-            let answer = Bound::new(py, Answer { answer, file, functions })?;
-            fault.value(py).setattr("answer", answer)?;
+            fault.value(py).setattr("answer", Bound::new(py, made(answer))?)?;
         }
         return Err(fault);
     }
@@ -168,7 +168,7 @@ pub fn solve(
     if answer.status == Status::Limit(Limit::Cancelled) {
         py.check_signals()?;
     }
-    Ok(Answer { answer, file, functions })
+    Ok(made(answer))
 }
 
 /// What came of a solve; `nonsmooth.Answer` has the words.
@@ -180,6 +180,8 @@ pub struct Answer {
     pub file: Arc<ProblemFile>,
     /// Its functions of Python, for the garbage collector.
     functions: Option<Py<Functions>>,
+    /// What the judge was asked for.
+    tolerance: f64,
 }
 
 /// Arrays by their names.
@@ -236,10 +238,22 @@ impl Answer {
         self.answer.seconds
     }
 
-    /// The deciding residual.
+    /// The relative residual.
     #[getter]
     fn residual(&self) -> f64 {
         self.answer.verdict.measure.relative
+    }
+
+    /// What else than the relative residual is beyond its limit, with its value. Of a relative residual that is, primal and dual are only parts.
+    #[getter]
+    fn failing(&self) -> Vec<(&'static str, f64)> {
+        let measure = &self.answer.verdict.measure;
+        let mut parts = vec!["relative residual"];
+        if measure.relative.is_nan() || measure.relative > self.tolerance {
+            parts.extend(["primal", "dual"]);
+        }
+        let failing = measure.failing(self.tolerance).into_iter();
+        failing.filter(|f| !parts.contains(&f.what)).map(|f| (f.what, f.value)).collect()
     }
 
     /// The kind of the problem.
@@ -290,6 +304,10 @@ impl Answer {
 
     /// What a status rests on that says that there is no solution.
     fn certificate<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        if let Status::Infeasible(proof) = &self.answer.status {
+            // With the fractions that were verified.
+            return Ok(Some(pythonize(py, proof)?));
+        }
         let certificate = self.answer.certificate();
         certificate.map(|all| Ok(pythonize(py, all)?)).transpose()
     }

@@ -281,6 +281,25 @@ def test_what_has_no_derivative_says_so():
             make()
 
 
+def test_parameters_and_their_directions_are_looked_at():
+    problem = ns.MCP(["x1 - 1", "x2 - 2"], [0.0, 0.0])
+    answer = ns.solve(problem)
+    parameters = np.array([[1.0, 0.0, 2.0], [0.0, 1.0, 0.0]])
+    for given in (parameters, parameters.tolist(), sp.coo_matrix(parameters)):
+        by = ns.derivative(problem, answer, parameters=given)
+        np.testing.assert_allclose(by.jvp([1.0, 2.0, 3.0])["x"], -parameters @ [1.0, 2.0, 3.0], atol=1e-9)
+        np.testing.assert_allclose(by.vjp(x=[1.0, 1.0]), -parameters.sum(axis=0), atol=1e-9)
+        with pytest.raises(ns.Error, match=r"dp: expected 3 entries \(columns of parameters\), found an array of \(1,\)"):
+            by.jvp([1.0])
+        with pytest.raises(ns.Error, match="dp: expected an array of real numbers"):
+            by.jvp(["a"] * 3)
+    for wrong in ([["1.0"], ["2.0"]], parameters * 1j, sp.csr_matrix(parameters * 1j)):
+        with pytest.raises(ns.Error, match="parameters.*: expected an array of real numbers"):
+            ns.derivative(problem, answer, parameters=wrong)
+    with pytest.raises(ns.Error, match="parameters: expected 2 rows"):
+        ns.derivative(problem, answer, parameters=np.eye(3))
+
+
 def test_gradients_through_torch():
     torch = pytest.importorskip("torch")
     M, n = unsymmetric(8, 3), 8
@@ -309,3 +328,29 @@ def test_gradients_through_torch():
     with torch.no_grad():
         ahead, behind = (((Solve.apply(2.0 * (q + s * h * d))[0]) ** 2).sum() for s in (1, -1))
     assert float(q.grad @ d) == pytest.approx(float(ahead - behind) / (2 * h), abs=1e-6)
+
+
+def test_a_pattern_that_lacks_a_variable_at_the_solution_is_noticed():
+    def f(x):
+        return np.array([x[0] + 2 * max(0.0, x[1] - 10) - 3, x[1] - 12.0, x[2] + x[0] - 5])
+
+    def make(**more):
+        problem = ns.MCP(f, np.zeros(3), lower=-np.inf, **more)
+        return problem, ns.solve(problem, tol=1e-12)
+
+    with pytest.raises(ns.Error, match="row 1 of F: expected to change by .* the pattern lacks a variable"):
+        ns.derivative(*make(), "F")
+    by_pattern = ns.derivative(*make(pattern=np.ones((3, 3))), "F").matrix("x")
+    by_jacobian = ns.derivative(*make(jac=lambda x: np.array([[1, 2.0, 0], [0, 1, 0], [1, 0, 1.0]])), "F").matrix("x")
+    np.testing.assert_allclose(by_pattern, by_jacobian, atol=1e-7)
+    np.testing.assert_allclose(by_jacobian, [[-1, 2, 0], [0, -1, 0], [1, -2, -1]], atol=1e-12)
+
+
+def test_near_the_tip_of_a_cone():
+    A = np.array([[10.0, -4.0, -2.0], [-4.0, 5.0, 4.0], [-2.0, 4.0, 9.0]])
+    F = np.array([0.9999999315138433, -0.9999999981764645, -2.2012579473350878e-10])
+    problem = ns.VI(lambda x: A @ x + F, ns.SecondOrderCone(3), np.zeros(3), jac=lambda x: A)
+    rough, fine = (ns.solve(problem, **how) for how in ({}, {"tol": 1e-15}))
+    assert np.abs(fine.x).max() < 1e-7
+    there = ns.derivative(problem, fine, tol=1e-13).matrix("x")
+    np.testing.assert_allclose(ns.derivative(problem, rough).matrix("x"), there, atol=1e-5)

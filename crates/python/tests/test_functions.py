@@ -380,6 +380,73 @@ def test_where_numbers_become_complex_a_function_is_not_defined():
     assert not [line for line in answer.account if "raised" in line]
 
 
+def test_what_a_function_raises_is_raised_by_the_judge_too(tmp_path):
+    fault = None
+
+    def F(x):
+        return x - 1 if fault is None else fault()
+
+    problem, path = ns.MCP(F, np.zeros(2), jac=lambda x: np.eye(2)), tmp_path / "p.csv"
+    answer = ns.solve(problem)
+    for fault, kind, said in (
+        (lambda: raising(ValueError("no such x")), ValueError, "no such x"),
+        (lambda: raising(MemoryError("none left")), MemoryError, "none left"),
+        (lambda: raising(KeyboardInterrupt()), KeyboardInterrupt, None),
+        (lambda: nobody_knows_this, NameError, "nobody_knows_this"),  # noqa: F821
+        (lambda: np.zeros(7), ns.Error, r"F\(x\): expected 2 values, found 7"),
+    ):
+        for ask in (
+            lambda: problem.judge(answer),
+            lambda: problem.judge(answer.x),
+            lambda: problem.save(path, answer.x),
+        ):
+            with pytest.raises(kind, match=said):
+                ask()
+    assert not path.exists()
+    fault = None
+    assert problem.judge(answer)["solved"]
+
+
+@pytest.mark.parametrize("n", [3, 400])
+def test_what_is_raised_where_it_was_asked_ends_nothing_else(n):
+    bad = contextvars.ContextVar("bad", default=False)
+    asked, came = [], []
+
+    def elsewhere(ask):
+        def run():
+            bad.set(True)
+            try:
+                ask()
+            except ZeroDivisionError as fault:
+                came.append(str(fault))
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        thread.join()
+
+    def called(found):
+        if bad.get():
+            raise ZeroDivisionError("by nothing")
+        if asked:
+            elsewhere(asked.pop())
+        return found
+
+    problem = ns.MCP(
+        lambda x: called(x**3 + x - 2), np.zeros(n), jac=lambda x: called(sp.diags(3 * x**2 + 1).tocsr())
+    )
+    answer = ns.solve(problem)
+    judge, *_ = asks = (
+        lambda: problem.judge(answer)["solved"],
+        lambda: ns.solve(problem).solved,
+        lambda: ns.derivative(problem, answer).degenerate == 0,
+    )
+    for mine in asks:
+        # Two that are on threads of the library's own are not told apart.
+        for other in asks if n < 300 or mine is judge else [judge]:
+            asked.append(other)
+            assert mine() and came.pop() == "by nothing"
+
+
 class Model:
     """Holds a problem whose functions are its own."""
 

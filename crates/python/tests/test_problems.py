@@ -382,6 +382,59 @@ def test_velocities_that_are_not_given_follow_from_the_impulses(tmp_path):
     assert np.allclose(ns.read(tmp_path / "slides.hdf5").solution["v"], answer.v)
 
 
+def test_what_is_saved_beside_a_point_is_of_the_problem_as_it_is(tmp_path):
+    problem = ns.Friction(W=np.eye(3), q=[-1.0, 2.0, 1.5], mu=0.5)
+    answer = ns.solve(problem)
+    other = ns.Friction(W=np.eye(3), q=[1.0, 0.0, 0.0], mu=0.5)
+    problem.update(q=[-3.0, 1.0, 1.0])
+    for now in (problem, other):
+        now.save(tmp_path / "p.hdf5", answer)
+        again = ns.read(tmp_path / "p.hdf5")
+        np.testing.assert_allclose(again.solution["u"], answer.r + now.q, atol=1e-12)
+        now.save(tmp_path / "p.csv", answer)
+        now.save(tmp_path / "r.csv", answer.r)
+        assert (tmp_path / "p.csv").read_text() == (tmp_path / "r.csv").read_text()
+    lcp = ns.LCP(np.eye(2), [-1.0, 1.0])
+    found = ns.solve(lcp)
+    lcp.update(q=[-5.0, 1.0])
+    lcp.save(tmp_path / "p.toml", found)
+    assert ns.read(tmp_path / "p.toml").solution["w"].tolist() == [-4.0, 1.0]
+
+
+@pytest.mark.parametrize("make", [np.array, sp.csc_matrix])
+def test_blocks_are_changed_by_blocks(make):
+    rng = np.random.default_rng(0)
+    A, B, C, D = (rng.normal(size=shape) for shape in ((2, 2), (3, 3), (2, 3), (3, 2)))
+    parts = dict(A=make(A), B=make(B), C=make(C), D=make(D), a=[1.0, 2.0], b=[-1.0, 3.0, -2.0])
+    problem = ns.MLCP(**parts)
+
+    def whole(part):
+        return part.toarray() if sp.issparse(part) else part
+
+    for change in (dict(a=[3.0, 4.0]), dict(B=make(2 * B), b=[1.0, 1.0, 1.0]), dict(C=make(3 * C)), dict(A=make(A + 1), D=make(D - 1))):
+        problem.update(**change)
+        parts.update(change)
+        made = ns.MLCP(**parts)
+        assert problem.q.tolist() == made.q.tolist() and type(problem.M) is type(made.M)
+        np.testing.assert_array_equal(whole(problem.M), whole(made.M))
+    with pytest.raises(ns.Error, match="either M, q and free, or A, B, C, D, a and b"):
+        problem.update(a=[1.0, 2.0], q=np.ones(5))
+    with pytest.raises(ns.Error, match="A: expected"):
+        problem.update(a=[1.0])
+    # One of another size.
+    problem.update(A=[[2.0]], B=[[2.0]], C=[[0.0]], D=[[0.0]], a=[1.0], b=[-1.0])
+    assert (problem.free, problem.unknowns) == (1, 2)
+
+
+def test_names_are_dropped_where_there_are_more_variables(tmp_path):
+    (tmp_path / "p.toml").write_text('kind = "lcp"\nnames = ["a", "b"]\nq = [-1.0, 1.0]\nM = [[1.0, 0.0], [0.0, 1.0]]\n')
+    problem = ns.read(tmp_path / "p.toml")
+    problem.update(q=[1.0, 1.0])
+    assert problem.names == ["a", "b"]
+    problem.update(M=np.eye(3), q=np.ones(3))
+    assert problem.names == [] and pickle.loads(pickle.dumps(problem)).unknowns == 3
+
+
 def work(k):
     """What ends in an exception, in another process."""
     problem = ns.LCP([[0.0]], [-1.0])

@@ -91,6 +91,13 @@ def test_callbacks_see_and_end():
     assert simulation.run(0.1).solved
 
 
+def test_a_callback_that_is_none_is_refused_before_a_step():
+    simulation = ns.Simulation(ball(), h=1e-3)
+    with pytest.raises(ns.Error, match="on_step: expected a function of nonsmooth.Step, found 5"):
+        simulation.run(0.01, on_step=5)
+    assert simulation.t == 0.0
+
+
 def test_ctrl_c_ends_a_run():
     simulation = ns.Simulation(ball(), h=1e-6)
     threading.Timer(0.2, lambda: os.kill(os.getpid(), signal.SIGINT)).start()

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import inspect
 import pathlib
+import pickle
+import re
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -104,10 +107,32 @@ def test_the_status_is_the_judges():
     assert not problem.judge(np.zeros(90))["solved"]
 
 
+def test_what_else_than_the_residual_fails_is_named():
+    # A row that no contact touches, where no step is done.
+    problem = ns.Friction(W=np.eye(3), q=[1.0, 0.0, 0.0], mu=0.5, R=[[1.0]], s=[-1.0], lower=-0.1, upper=0.5)
+    answer = ns.solve(problem, "psor", max_iter=0, tol=1e-2)
+    assert not answer.solved
+    assert answer.residual < 1e-2 and "fails bilateral constraints 1," in repr(answer)
+    with pytest.raises(ns.Unsolved, match="; relative residual .*; fails bilateral constraints 1$") as caught:
+        answer.raise_if_unsolved()
+    again = pickle.loads(pickle.dumps(answer))
+    assert repr(again) == repr(answer) and str(ns.Unsolved(again)) == str(caught.value)
+    assert "fails</th>" in answer._repr_html_() and "bilateral constraints 1<" in answer._repr_html_()
+    solved = ns.solve(problem)
+    assert solved.solved and "fails" not in repr(solved) + solved._repr_html_()
+    # Of a residual that is too large primal and dual ones are parts.
+    large = ns.solve(local(30, mu=0.9), "nsgs", max_iter=1, tol=1e-12)
+    assert "fails own residual" in repr(large) and not re.search(r"\b(primal|dual) ", repr(large))
+
+
 def test_no_solution_is_a_status_with_a_certificate():
     answer = ns.solve(ns.LCP([[-2.0, 1.0], [1.0, -2.0]], [-1.0, -1.0]))
     assert answer.status is ns.Status.INFEASIBLE and answer.certificate is not None
     assert "proof" in answer.certificate
+    # The fractions that were verified: y > 0 with yᵀ M < 0 and yᵀ q < 0.
+    [vector] = answer.certificate["exact"]
+    [a, b] = [Fraction(text) for _, text in vector]
+    assert a > 0 and b > 0 and -2 * a + b < 0 and a - 2 * b < 0
 
 
 def test_warm_starts(box):

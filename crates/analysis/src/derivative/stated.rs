@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use nonsmooth_linalg::{Csc, Matrix, budget};
 use nonsmooth_problem::check::{ContactStatus, Judged, Motion, RowCounts, RowStatus, VerdictOf};
-use nonsmooth_problem::field::Field;
+use nonsmooth_problem::field::{Evaluator, Field, Pattern, tentatively};
 use nonsmooth_problem::{
     Bounds, BoxLcp, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Lcp, LcpPoint,
     LocalPoint, Mcp, Mlcp, ProblemError,
@@ -305,13 +305,68 @@ pub(super) fn mcp(
 pub(super) fn jacobian(field: &dyn Field, x: &[f64]) -> Result<(Vec<f64>, Csc), DerivativeError> {
     let (n, pattern) = (field.dim(), field.pattern());
     let (mut f, mut values) = (vec![0.0; n], vec![0.0; pattern.len()]);
-    let defined = field.evaluator().jacobian(x, &mut f, &mut values);
+    let mut run = field.evaluator();
+    let defined = run.jacobian(x, &mut f, &mut values);
     if !defined || values.iter().any(|a| !a.is_finite()) {
         return Err(DerivativeError::Undefined);
+    }
+    if field.expressions().is_none() {
+        holds(&mut *run, pattern, x, (&f, &values))?;
     }
     let entries = pattern.places().zip(&values).map(|((i, j), &a)| (i, j, a));
     let jacobian = Csc::from_triplets(n, n, entries).map_err(ProblemError::from)?;
     Ok((f, jacobian))
+}
+
+/// A change of all variables, in parts of their size, along which a Jacobian is held against F.
+const CHANGE: f64 = 1.0 / 8192.0;
+/// What it may miss of the change of F, in parts of its terms, and of F itself.
+const ALLOWED: [f64; 2] = [0.1, 1e-9];
+
+/// A caller's Jacobian, or one by differences in a pattern that was found elsewhere, is a claim: along a change of all variables F has to change as it says, on one side at least, since there may be a
+/// kink. Two values of F.
+fn holds(
+    run: &mut dyn Evaluator,
+    pattern: &Pattern,
+    x: &[f64],
+    (f, jacobian): (&[f64], &[f64]),
+) -> Result<(), DerivativeError> {
+    let sizes = || x.iter().map(|x| x.abs()).filter(|x| *x > 0.0);
+    let least = sizes().fold(f64::INFINITY, f64::min);
+    let least = if least.is_finite() { least } else { 1.0 };
+    // Of no order, and never the same twice.
+    let d: Vec<f64> = (0..x.len())
+        .map(|j| {
+            let part = (0.618_033_988_749_895 * (j + 1) as f64).fract();
+            let sign = if (j * j / 2 + j).is_multiple_of(2) { 1.0 } else { -1.0 };
+            CHANGE * sign * (0.5 + 0.5 * part) * if x[j] != 0.0 { x[j].abs() } else { least }
+        })
+        .collect();
+    let mut there = |sign: f64| {
+        let y: Vec<f64> = x.iter().zip(&d).map(|(x, d)| x + sign * d).collect();
+        let mut value = vec![f64::NAN; x.len()];
+        tentatively(|| run.value(&y, &mut value)).then_some(value)
+    };
+    let sides = [(1.0, there(1.0)), (-1.0, there(-1.0))];
+    for (row, &before) in f.iter().enumerate() {
+        let terms = jacobian[pattern.range(row)].iter().zip(pattern.row(row));
+        let (mut said, mut moduli, mut size) = (0.0, 0.0, before.abs());
+        for (a, &j) in terms {
+            said += a * d[j];
+            moduli += (a * d[j]).abs();
+            size += (a * x[j]).abs();
+        }
+        let changes = sides.iter().filter_map(|(sign, value)| {
+            value.as_ref().map(|value| sign * (value[row] - before)).filter(|c| c.is_finite())
+        });
+        let misses = |change: &f64| (change - said).abs() > ALLOWED[0] * moduli + ALLOWED[1] * size;
+        if let Some(found) = changes.clone().next()
+            && changes.clone().all(|change| misses(&change))
+        {
+            return Err(DerivativeError::Mistaken { row, said, found });
+        }
+    }
+    Ok(())
 }
 
 /// Contacts with their places in x and y, both from `first` on.

@@ -49,11 +49,20 @@ class Unsolved(RuntimeError):
     """An answer that the judge does not accept; see :meth:`Answer.raise_if_unsolved`."""
 
     def __init__(self, answer: Answer) -> None:
-        super().__init__(f"{answer.message}; relative residual {answer.residual:.3g}")
+        fails = _fails(answer)
+        super().__init__(
+            f"{answer.message}; relative residual {answer.residual:.3g}" + (f"; {fails}" if fails else "")
+        )
         self.answer = answer
 
     def __reduce__(self) -> Any:
         return Unsolved, (self.answer,)
+
+
+def _fails(answer: Answer) -> str:
+    """What else than the relative residual the judge does not accept, in the words of the command line."""
+    said = ", ".join(f"{what} {value:.3g}" for what, value in answer._native.failing)
+    return f"fails {said}" if said else ""
 
 
 class Table(np.ndarray[Any, np.dtype[np.void]]):
@@ -97,7 +106,7 @@ def _tabled(columns: Mapping[str, Any]) -> Table:
 class Recorded:
     """What an answer says, without its problem: what :mod:`pickle` takes to another process."""
 
-    FACTS = ("kind", "status", "solved", "message", "residual", "iterations", "factorisations", "seconds", "account")
+    FACTS = ("kind", "status", "solved", "message", "residual", "failing", "iterations", "factorisations", "seconds", "account")
     FOUND = ("parts", "residuals", "counts", "worst", "history", "certificate", "table")
 
     def __init__(self, native: Union[_nonsmooth.Answer, Recorded]) -> None:
@@ -151,7 +160,11 @@ class Answer:
 
     @property
     def residual(self) -> float:
-        """The relative residual, which decides; a pure number."""
+        """The relative residual, a pure number: the first of the judge's criteria.
+
+        Bilateral constraints, the dynamics, and each contact by its own terms have criteria beside it (``residuals``): an answer may be unsolved though this is small. Which ones fail,
+        its ``repr`` and :class:`Unsolved` say.
+        """
         return self._native.residual
 
     @property
@@ -219,7 +232,7 @@ class Answer:
 
     @property
     def certificate(self) -> Optional[dict[str, Any]]:
-        """What the status rests on, where it says that there is no solution."""
+        """What the status rests on, where it says that there is no solution; of a proof also ``exact``: for each vector (row, fraction as text) of the entries that were verified in exact arithmetic."""
         return self._native.certificate()
 
     def raise_if_unsolved(self) -> Answer:
@@ -243,9 +256,11 @@ class Answer:
         return [*super().__dir__(), *self.parts]
 
     def __repr__(self) -> str:
+        fails = _fails(self)
         return (
             f"<Answer: {self.status}, residual {self.residual:.2e}, "
-            f"{self.iterations} iterations, {self.seconds:.3g} s>"
+            + (f"{fails}, " if fails else "")
+            + f"{self.iterations} iterations, {self.seconds:.3g} s>"
         )
 
     def _repr_html_(self) -> str:
@@ -255,6 +270,8 @@ class Answer:
             ("work", f"{self.iterations} iterations, {self.seconds:.3g} s"),
             ("counts", ", ".join(f"{n} {name}" for name, n in self.counts.items() if n)),
         ]
+        if fails := _fails(self):
+            rows.insert(2, ("fails", fails.removeprefix("fails ")))
         said = "".join(f"<li>{html.escape(line)}</li>" for line in self.account)
         return _table("Answer", rows) + (f"<ul>{said}</ul>" if said else "")
 
@@ -294,8 +311,7 @@ def solve(
     """
     name, own = arguments.named(solver)
     every = {**own, **registered(settings)} if settings else own
-    if callback is not None and not callable(callback):
-        raise arguments.mistake("callback", "a function of nonsmooth.Progress", callback)
+    callback = arguments.function("callback", "a function of nonsmooth.Progress", callback)
     try:
         native = _nonsmooth.solve(
             arguments.problem(problem),

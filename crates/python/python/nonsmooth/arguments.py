@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import operator
-from typing import Mapping, Optional, SupportsFloat, SupportsIndex
+import os
+from typing import Callable, Collection, Iterable, Mapping, Optional, SupportsFloat, SupportsIndex, TypeVar, Union
+
+import numpy as np
 
 from . import _nonsmooth
-from .problems import Problem
 from .settings import Settings
+
+Called = TypeVar("Called", bound=Callable[..., object])
 
 
 def mistake(place: str, expected: str, found: object) -> _nonsmooth.Error:
-    """The error that says what was expected at a place, and what was found."""
-    return _nonsmooth.Error(f"{place}: expected {expected}, found {found!r}")
+    """The error that says what was expected at a place, and what was found, in a line."""
+    first, *others = repr(found).splitlines() or [""]
+    return _nonsmooth.Error(f"{place}: expected {expected}, found {first}{' …' if others else ''}")
 
 
 def real(place: str, value: object) -> float:
@@ -42,11 +47,60 @@ def seconds(place: str, value: object) -> Optional[float]:
     return None if value is None else real(place, value)
 
 
-def problem(value: object) -> _nonsmooth.Problem:
+def vector(place: str, value: object) -> _nonsmooth.Vector:
+    """An array of one dimension."""
+    array = _nonsmooth.reals(place, value)
+    if array.ndim == 1:
+        return array
+    raise mistake(place, "an array of one dimension", value)
+
+
+def flag(place: str, value: object) -> bool:
+    """Whether something is so."""
+    if isinstance(value, (bool, np.bool_)):
+        return bool(value)
+    raise mistake(place, "True or False", value)
+
+
+def function(place: str, what: str, value: Optional[Called]) -> Optional[Called]:
+    """A function, or none."""
+    if value is None or callable(value):
+        return value
+    raise mistake(place, what, value)
+
+
+def functions(place: str, value: Union[Called, Iterable[str]]) -> Union[Called, list[str]]:
+    """F: a function, or its expressions. A text is no list of them, though it is one of its letters."""
+    if callable(value):
+        return value
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
+        return list(value)
+    raise mistake(place, "a function, or a list of expressions", value)
+
+
+def path(place: str, value: object, what: str = "the path of a file") -> str:
+    """The path of a file."""
+    found = os.fspath(value) if isinstance(value, (str, os.PathLike)) else None
+    if isinstance(found, str):
+        return found
+    raise mistake(place, what, value)
+
+
+def one_of(place: str, names: Collection[str], value: object) -> str:
+    """One of some names."""
+    if isinstance(value, str) and value in names:
+        return value
+    raise _nonsmooth.Error(f"{place}: expected one of {', '.join(names)}, found {value}")
+
+
+def problem(value: object, place: str = "problem") -> _nonsmooth.Problem:
     """A problem of this package."""
+    # Its module reads its arguments here.
+    from .problems import Problem
+
     if isinstance(value, Problem):
         return value._native
-    raise mistake("problem", "a problem (nonsmooth.LCP, Friction, ..., or nonsmooth.read)", value)
+    raise mistake(place, "a problem (nonsmooth.LCP, Friction, ..., or nonsmooth.read)", value)
 
 
 def named(solver: object) -> tuple[str, Mapping[str, object]]:

@@ -33,7 +33,8 @@ class Profile:
 
     def at(self, solver: str, tau: float) -> float:
         """The share at τ ≥ 1."""
-        return max((y for x, y in self.curves[solver] if x <= tau), default=0.0)
+        curve, tau = self.curves[arguments.one_of("solver", self.curves, solver)], arguments.real("tau", tau)
+        return max((y for x, y in curve if x <= tau), default=0.0)
 
     def plot(self, ax: Optional[Axes] = None) -> Axes:
         """Draws them, with matplotlib."""
@@ -103,18 +104,27 @@ class Runs:
 
 def read_runs(path: Path) -> Runs:
     """The runs in a file of ``nonsmooth bench run``."""
-    return Runs(_nonsmooth.Runs.read(path))
+    return Runs(_nonsmooth.Runs.read(arguments.path("path", path)))
 
 
 def _each(problems: Problems) -> Iterable[tuple[str, Problem]]:
     if isinstance(problems, Mapping):
-        yield from problems.items()
+        for name, one in problems.items():
+            if not isinstance(name, str):
+                raise arguments.mistake("problems", "names that are texts", name)
+            arguments.problem(one, f"problems[{name!r}]")
+            yield name, one
         return
+    # A text is no list of files, though it is one of its letters.
+    if isinstance(problems, str) or not isinstance(problems, Iterable):
+        what = "a list of problems and paths of files, or a dictionary of problems by their names"
+        raise arguments.mistake("problems", what, problems)
     for k, one in enumerate(problems):
         if isinstance(one, Problem):
             yield one.title or f"problem{k}", one
         else:
-            yield pathlib.Path(one).stem, read(one)
+            path = arguments.path(f"problems[{k}]", one, "a problem, or the path of a file")
+            yield pathlib.Path(path).stem, read(path)
 
 
 def _label(solver: Union[str, Settings]) -> str:

@@ -7,7 +7,7 @@ from typing import Optional
 import numpy as np
 import numpy.typing as npt
 
-from . import _nonsmooth
+from . import _nonsmooth, arguments
 from .answers import Answer, Recorded
 from .problems import Matrix, Problem, Vector
 
@@ -40,7 +40,12 @@ class Derivative:
     def jvp(self, direction: npt.ArrayLike) -> dict[str, Vector]:
         """How the parts of the solution change with the data in a direction, an array (or a sparse matrix) like the part: two triangular solves."""
         if self._parameters is not None:
-            return self._native.forward("F", self._parameters @ np.asarray(direction, dtype=float))
+            change, k = _nonsmooth.reals("dp", direction), self._parameters.shape[1]
+            if change.shape not in ((k,), (k, 1)):
+                raise _nonsmooth.Error(
+                    f"dp: expected {k} entries (columns of parameters), found an array of {change.shape}"
+                )
+            return self._native.forward("F", self._parameters @ change)
         return self._native.forward(self.with_respect_to, direction)
 
     def vjp(self, **gradients: npt.ArrayLike) -> Vector:
@@ -75,9 +80,7 @@ class Derivative:
         As many solves as the part has entries.
         """
         sizes = self.parts
-        name = next(iter(sizes)) if part is None else part
-        if name not in sizes:
-            raise _nonsmooth.Error(f"part: expected one of {', '.join(sizes)}, found {name}")
+        name = next(iter(sizes)) if part is None else arguments.one_of("part", sizes, part)
         return np.array([self.vjp(**{name: e}) for e in np.eye(sizes[name])])
 
     def __repr__(self) -> str:
@@ -115,11 +118,17 @@ def derivative(
     and the derivative is one with respect to p. Entries of matrices are data each by itself: a change of a symmetric matrix has both of a pair.
 
     The judge has to accept the answer at ``tol`` (1e-6; the derivative has the accuracy of the answer, so solve with a small one). Cost: a sparse factorisation. Raises :class:`Error`
-    where there is no derivative, as with impulses that are not unique, and where ``time_limit`` seconds of wall clock have passed; Ctrl-C ends it too.
+    where there is no derivative, as with impulses that are not unique, of rolling friction, of which none is known, and where ``time_limit`` seconds of wall clock have passed;
+    Ctrl-C ends it too. What F and jac raise is raised here.
     """
+    of = arguments.problem(problem)
+    if not isinstance(answer, Answer):
+        raise arguments.mistake("answer", "an answer of nonsmooth.solve", answer)
     if isinstance(answer._native, Recorded):
         raise _nonsmooth.Error("answer: expected one of this process, found one that was pickled; solve(problem, warm_start=answer) makes it one")
-    native = _nonsmooth.Derivative(problem._native, answer._native, tol, time_limit)
+    native = _nonsmooth.Derivative(
+        of, answer._native, arguments.real("tol", tol), arguments.seconds("time_limit", time_limit)
+    )
     shapes = dict(native.data)
     if parameters is not None:
         if "F" not in shapes:
@@ -128,14 +137,18 @@ def derivative(
             raise _nonsmooth.Error(
                 f"with_respect_to: expected nothing beside parameters, found {with_respect_to}"
             )
-        given = parameters if hasattr(parameters, "tocsc") else np.asarray(parameters)
+        sparse = hasattr(parameters, "tocsc")
+        given: Matrix = parameters if sparse else _nonsmooth.reals("parameters", parameters)
         (n,) = shapes["F"]
         if given.ndim != 2 or given.shape[0] != n:
             raise _nonsmooth.Error(
                 f"parameters: expected {n} rows (entries of F), found an array of {given.shape}"
             )
+        if sparse:
+            given = given.tocsc()
+            _nonsmooth.reals("parameters.data", given.data)
         return Derivative(native, "p", given)
-    letter = next(iter(shapes)) if with_respect_to is None else with_respect_to
-    if letter not in shapes:
-        raise _nonsmooth.Error(f"with_respect_to: expected one of {', '.join(shapes)}, found {letter}")
+    letter = next(iter(shapes))
+    if with_respect_to is not None:
+        letter = arguments.one_of("with_respect_to", shapes, with_respect_to)
     return Derivative(native, letter)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Callable, ClassVar, Optional, Sequence, U
 import numpy as np
 import numpy.typing as npt
 
-from . import _nonsmooth
+from . import _nonsmooth, arguments
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,7 +69,7 @@ class Problem:
         """Puts other parts in the place of those that are there: ``problem.update(q=q)``.
 
         What a solver has found out of the pattern of the matrices is kept for the next solve with it.
-        Parts have the names that the constructor has, and bounds may be one number for all. Cost: a copy of the problem. Raises :class:`Error` where the
+        Parts have the names that the constructor has, and bounds may be one number for all. Where the number of unknowns is another one, names of variables are dropped. Cost: a copy of the problem. Raises :class:`Error` where the
         parts do not fit; then nothing is changed.
         """
         if "x0" in parts and "start" not in parts and self.kind in ("mcp", "vi"):
@@ -83,16 +83,24 @@ class Problem:
         self._native.update(parts)
 
     def save(self, path: Path, answer: object = None) -> None:
-        """Writes the problem in the format of the extension (.hdf5, .toml, .mtx, .nl, .csv), with a solution: an answer, or a point as :meth:`judge` takes it."""
+        """Writes the problem in the format of the extension (.hdf5, .toml, .mtx, .nl, .csv), with a solution: an answer, or a point as :meth:`judge` takes it.
+
+        What follows from the point (u, w, F, statuses) is that of the problem as it is now. What F raises is raised, and nothing is written.
+        """
         from .answers import Answer
 
-        self._native.save(path, answer._point if isinstance(answer, Answer) else answer)
+        self._native.save(arguments.path("path", path), answer._point if isinstance(answer, Answer) else answer)
 
     def judge(self, point: object, tol: float = 1e-8) -> dict[str, Any]:
-        """What the judge says of a point: an answer, a dictionary of its parts, or the array z (x; of contacts the impulses r)."""
+        """What the judge says of a point: an answer, a dictionary of its parts, or the array z (x; of contacts the impulses r).
+
+        Velocities v that are not given follow from the impulses r, and with them, of a global problem, the multipliers l of bilateral constraints. Of a local problem nothing
+        follows: l that are not given are zero. What F raises is raised.
+        """
         from .answers import Answer
 
-        return self._native.judge(point._point if isinstance(point, Answer) else point, tol)
+        given = point._point if isinstance(point, Answer) else point
+        return self._native.judge(given, arguments.real("tol", tol))
 
     @property
     def kind(self) -> str:
@@ -206,7 +214,7 @@ class Friction(Problem):
     ``K = {‖r_T‖ ≤ mu r_N, ‖r_R‖ ≤ mu_r r_N}``.
 
     ``mu`` and ``mu_r`` are one number for all contacts or one for each. q and w may be given as nc × D. ``dimension`` is 2 or 3 where it does not
-    follow from the shapes (a single mu: 3). Rows without bounds are bilateral constraints, ``c = 0``.
+    follow from the shapes (a single mu: 3); with ``mu_r`` it is 5. Rows without bounds are bilateral constraints, ``c = 0``.
     """
 
     __slots__ = ()
@@ -234,10 +242,12 @@ class Friction(Problem):
         parts = dict(
             mu=mu, mu_r=mu_r, W=W, q=q, V=V, R=R, s=s, M=M, H=H, f=f, w=w, G=G, b=b, lower=lower, upper=upper
         )
-        known = (2, 3) if mu_r is None else (2, 3, 5)
+        known = (2, 3) if mu_r is None else (5,)
         if dimension is not None and (np.ndim(dimension) != 0 or np.asarray(dimension).item() not in known):
-            raise _nonsmooth.Error(f"dimension: expected one of {', '.join(map(str, known))}, found {dimension!r}")
-        self._native = _nonsmooth.Problem.friction(parts, dimension)
+            what = "5, as of all contacts with mu_r" if mu_r is not None else "one of 2, 3"
+            raise arguments.mistake("dimension", what, dimension)
+        given = None if dimension is None else arguments.whole("dimension", np.asarray(dimension).item())
+        self._native = _nonsmooth.Problem.friction(parts, given)
 
     @property
     def contacts(self) -> int:
@@ -314,7 +324,7 @@ class BoxLCP(Problem):
         try:
             n: Optional[int] = np.size(q)
         except ValueError:
-            n = None  # What is wrong with q is said where it is read.
+            n = 0  # What is wrong with q is said where it is read.
         lower = _all(0.0 if lower is None else lower, n)
         upper = _all(np.inf if upper is None else upper, n)
         parts = dict(M=M, q=q, lower=lower, upper=upper)
@@ -326,7 +336,8 @@ class MCP(Problem):
 
     F is a function of an array, or a list of expressions in x1, x2, … (then values and Jacobian are exact and compiled). ``jac`` gives JF(x), n × n, with
     all entries or sparse; without it differences are taken, along ``pattern`` (a matrix, zero where JF is) where that is given; else F is called with NaN in some
-    places to find out what depends on what. Where ``jac`` gives a sparse matrix and there is no pattern, the entries stored at ``x0`` are the pattern. ``x0`` is where solvers begin. Bounds are 0 and ∞ where nothing is said.
+    places to find out what depends on what, at four points: ``x0`` and three about it. What depends on more only elsewhere (``np.where``, ``max``) needs ``pattern`` or ``jac``:
+    what was not seen is zero in the Jacobian. Where ``jac`` gives a sparse matrix and there is no pattern, the entries stored at ``x0`` are the pattern. ``x0`` is where solvers begin. Bounds are 0 and ∞ where nothing is said.
 
     An exception in F or jac ends the solve and is raised from it. Within a solve they are not called twice at the points last seen.
     """
@@ -344,11 +355,10 @@ class MCP(Problem):
         upper: Optional[Numbers] = None,
         pattern: Optional[Matrix] = None,
     ) -> None:
-        if not callable(F):
-            F = list(F)
-        n = len(F) if isinstance(F, list) else None
+        read = arguments.functions("F", F)
+        n = len(read) if isinstance(read, list) else None
         parts = dict(
-            F=F,
+            F=read,
             start=x0,
             jac=jac,
             lower=_all(lower, n),
@@ -382,7 +392,7 @@ class VI(Problem):
         pattern: Optional[Matrix] = None,
     ) -> None:
         parts = dict(
-            F=F if callable(F) else list(F), set=set, start=x0, jac=jac, pattern=pattern
+            F=arguments.functions("F", F), set=set, start=x0, jac=jac, pattern=pattern
         )
         self._native = _nonsmooth.Problem.stated(self._kind, parts)
 
@@ -417,4 +427,4 @@ def read(path: Path) -> Any:
 
     It is one of :class:`Friction`, :class:`LCP`, :class:`MLCP`, :class:`HLCP`, :class:`BoxLCP`, :class:`MCP`, :class:`VI`.
     """
-    return Problem._of(_nonsmooth.Problem.read(path))
+    return Problem._of(_nonsmooth.Problem.read(arguments.path("path", path)))

@@ -30,13 +30,11 @@ class Polyhedron:
     d: Optional[npt.ArrayLike] = None
 
     def _parts(self) -> dict[str, Any]:
-        A = self.A if hasattr(self.A, "shape") else np.asarray(self.A, dtype=float)
-        C = np.zeros((0, A.shape[-1])) if self.C is None else self.C
         return {
             "kind": "polyhedron",
-            "A": A,
+            "A": self.A,
             "b": self.b,
-            "C": C,
+            "C": self.C,
             "d": np.zeros(0) if self.d is None else self.d,
         }
 
@@ -69,7 +67,7 @@ class Product:
     sets: Sequence[Set]
 
     def _parts(self) -> dict[str, Any]:
-        return {"kind": "product", "sets": list(self.sets)}
+        return {"kind": "product", "sets": self.sets}
 
 
 Set = Union[Box, Polyhedron, Ball, SecondOrderCone, Product]

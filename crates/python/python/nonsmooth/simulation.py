@@ -104,7 +104,7 @@ class World:
         if dimension != 3:
             self.document["dimension"] = arguments.whole("dimension", dimension)
         down = [-9.81 * x for x in self._upwards()]
-        self.document["gravity"] = down if gravity is None else [float(x) for x in gravity]
+        self.document["gravity"] = down if gravity is None else arguments.vector("gravity", gravity).tolist()
         self.warnings: list[str] = []
 
     def _list(self, name: str) -> list[Any]:
@@ -252,6 +252,8 @@ class World:
 
     def couple(self, weights: Mapping[str, float], *, name: str = "") -> None:
         """Keeps a weighted sum of coordinates of joints constant, by the names of the joints: gears, racks, pulleys."""
+        if not isinstance(weights, Mapping):
+            raise arguments.mistake("weights", "a dictionary of weights by the names of joints", weights)
         terms = [{"joint": joint, "weight": weight} for joint, weight in weights.items()]
         self._list("couplings").append({"name": name, "terms": terms})
 
@@ -315,7 +317,7 @@ def draw(scene: Union[World, Run], frame: int = -1) -> Picture:
 
 def load(path: Path) -> World:
     """The world of a scene file (TOML or JSON), with its meshes, of a robot (URDF, or a model of MuJoCo), or of a scene of Siconos (its mechanics HDF5). What was left out is in ``warnings``."""
-    text, warnings = _nonsmooth.read_scene(path)
+    text, warnings = _nonsmooth.read_scene(arguments.path("path", path))
     world = World()
     world.document, world.warnings = json.loads(text), warnings
     return world
@@ -355,7 +357,7 @@ class Simulation:
             table["tol"] = arguments.real("tol", tol)
         self.h = float(document["time"]["h"])
         self._world = world
-        self._native = _nonsmooth.Simulation(world.json(), settle)
+        self._native = _nonsmooth.Simulation(world.json(), arguments.flag("settle", settle))
 
     @property
     def t(self) -> float:
@@ -412,6 +414,7 @@ class Simulation:
         KeyboardInterrupt. Either way the simulation is whole, and goes on from the last step.
         """
         until, every = arguments.real("until", until), arguments.whole("every", every)
+        on_step = arguments.function("on_step", "a function of nonsmooth.Step", on_step)
         if until < 0.0:
             raise arguments.mistake("until", f"a time of at least 0 s (it is {self.t:g} s)", until)
         return Run(self._native.run(until, self.h, every, on_step), self)

@@ -382,7 +382,6 @@ impl Detector {
         let mut finders = std::mem::take(&mut self.finders);
         finders.resize_with(finders.len().max(parts), Finder::default);
         let (this, t) = (&*self, state.t);
-        // Of what was never looked at nothing is known.
         let known = (state.steps > 0).then_some(&state.memory);
         let share = this.pairs.len().div_ceil(parts).max(1);
         let used = this.pairs.len().div_ceil(share);
@@ -443,10 +442,7 @@ impl Detector {
                 last += 1;
             }
             let axis = known.get(last).filter(|k| k.0 == pair).map(|k| k.1);
-            let reach = Reach {
-                margins: [p, q].map(|body| margins[body as usize]),
-                depth: before.map_or(f64::INFINITY, |memory| memory.depth((i, j))),
-            };
+            let reach = Reach { margins: [p, q].map(|body| margins[body as usize]), before };
             let first = finder.found.len();
             let now = self.narrow((world, t), pair, axis, reach, finder);
             finder.axes.extend(now.map(|now| (pair, now)));
@@ -536,7 +532,7 @@ impl Detector {
         (world, time): (&World, f64),
         Pair { first: i, second: j, image }: Pair,
         axis: Option<Axis>,
-        Reach { margins, depth }: Reach,
+        Reach { margins, before }: Reach,
         Finder { clip, scratch, found: out, image: moved, .. }: &mut Finder,
     ) -> Option<Axis> {
         let Self { solids, poses, hulls, boxes, box_of, .. } = self;
@@ -695,6 +691,8 @@ impl Detector {
                 None
             }
             (Solid::Surface(p), Solid::Surface(q)) => {
+                // Of what was never looked at nothing is known.
+                let depth = before.map_or(f64::INFINITY, |memory| memory.depth((i, j)));
                 surfaces::collide((p, a), (q, b), (prediction, depth), (clip, scratch), found);
                 None
             }
@@ -731,11 +729,11 @@ impl Detector {
     }
 }
 
-/// How far two shapes are looked for: the margins of their bodies, which the box of each has already, and how deep they may be in each other.
+/// How far two shapes are looked for: the margins of their bodies, which the box of each has already, and what is remembered of the step before, if there was one.
 #[derive(Clone, Copy)]
-struct Reach {
+struct Reach<'a> {
     margins: [f64; 2],
-    depth: f64,
+    before: Option<&'a ContactMemory>,
 }
 
 /// Points of a surface and another shape at the same place with the same normal become one, that of the least key.

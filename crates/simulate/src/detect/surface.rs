@@ -81,9 +81,26 @@ pub(crate) struct Scratch {
     pub(super) pairs: Vec<(u32, u32)>,
     pub(super) stack: Vec<(u32, u32)>,
     pub(super) found: Vec<([Feature; 2], Witness)>,
+    /// Points of two surfaces on faces of each other, the pairs of faces that do not meet in them, and triangles that lie on each other.
+    pub(super) hits: Vec<Hit>,
+    pub(super) dropped: Vec<Faces>,
+    pub(super) lying: Vec<(u32, u32)>,
     /// Where surfaces meet, and pairs of edges, with their gaps, that count where they do not.
     pub(super) met: Vec<Vec3>,
     pub(super) held: Vec<(f64, [Feature; 2], Witness)>,
+}
+
+/// Whether the normal is one of the first of two surfaces, the plane face that it is of, and that of the other surface.
+pub(super) type Faces = (bool, u32, u32);
+
+/// A point where a triangle of one surface is in front of one of another, or behind it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hit {
+    pub faces: Faces,
+    pub features: [Feature; 2],
+    pub witness: Witness,
+    /// It is at a diagonal of a plane face, where the surfaces have nothing.
+    pub flat: bool,
 }
 
 /// A triangle as a polyhedron without thickness.

@@ -5,7 +5,8 @@
 //! features, so that nothing is met across an edge that is not there.
 //!
 //! A triangle does not say how deep a body is behind it. What is deeper than a share of the thinner body is no contact; and of two faces that a point is behind the nearer one is
-//! met: a corner that has sunk a little into the top of a box is not far behind its side. Two edges that are near a face so are met all the same, the least deep first, where nothing
+//! met: a corner that has sunk a little into the top of a box is not far behind its side. That is asked of all points of two plane faces together, by their mean, however they are cut into triangles: those of a triangle may all
+//! be at the edge of its face, which is flush with one of the other body. Two edges that are near a face so are met all the same, the least deep first, where nothing
 //! else is met within their depth.
 //!
 //! Cost: the pairs of triangles that are near each other, times the logarithm of all.
@@ -15,7 +16,7 @@ use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 use crate::detect::broad::Aabb;
 use crate::detect::clip::Clip;
 use crate::detect::segments::{Segment, closest};
-use crate::detect::surface::{CONE, DEEP, FACING, Scratch, Surface, Thin};
+use crate::detect::surface::{CONE, DEEP, FACING, Faces, Hit, Scratch, Surface, Thin};
 use crate::detect::witness::{Feature, Witness};
 use crate::rotation::{Pose, product};
 
@@ -46,7 +47,7 @@ pub(crate) fn collide(
 ) {
     let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
     let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
-    let Scratch { thin, other, pairs, stack, found: list, met, held, .. } = scratch;
+    let Scratch { thin, other, pairs, stack, hits, dropped, lying, met, held, .. } = scratch;
     let thin_body = a.thickness.min(b.thickness);
     let margin = prediction.max(depth.max(SUNK * thin_body).min(DEEP * thin_body));
     near(a, b, &relative, margin, (pairs, stack));
@@ -54,6 +55,8 @@ pub(crate) fn collide(
     let at = |witness: &Witness| witness.place(a_pose, b_pose, [0.0, 0.0, 1.0]).point;
     met.clear();
     held.clear();
+    hits.clear();
+    lying.clear();
     for &(t, u) in &*pairs {
         if t != last {
             a.template(t, a_pose, thin);
@@ -62,23 +65,12 @@ pub(crate) fn collide(
         b.template(u, b_pose, other);
         let facing = dot(thin.posed.normals[0], other.posed.normals[0]);
         if facing < CONE {
-            let both = facing < FACING * FACING - 1.0;
             let (one, two) = ((a, t, &*thin, a_pose), (b, u, &*other, b_pose));
-            for (first, second, on_a) in [(one, two, true), (two, one, false)] {
-                list.clear();
-                on_face(first, second, clip, prediction, |f, w| list.push((f, w)));
-                if too_deep(list, (first.0, first.3), second.3, thin_body) {
-                    continue;
-                }
-                for &([f, g], w) in list.iter() {
-                    let (features, w) = if on_a { ([f, g], w) } else { ([g, f], w.swapped()) };
-                    met.push(at(&w));
-                    found(features, w);
-                }
-                // What lies on each other is met with the normal of the first.
-                if both {
-                    break;
-                }
+            on_face(one, two, true, clip, prediction, hits);
+            // What lies on each other is met with the normal of the first.
+            match facing < FACING * FACING - 1.0 {
+                true => lying.push((t, u)),
+                false => on_face(two, one, false, clip, prediction, hits),
             }
         }
         for (e, f) in edges((a, t), (b, u)) {
@@ -95,6 +87,23 @@ pub(crate) fn collide(
                 found(features, witness);
             }
         }
+    }
+    dropped.clear();
+    let both = ((a, a_pose), (b, b_pose));
+    let mut take = |features: [Feature; 2], witness: Witness| {
+        met.push(at(&witness));
+        found(features, witness);
+    };
+    settle(hits, both, thin_body, dropped, &mut take);
+    if !dropped.is_empty() {
+        lying.retain(|&(t, u)| dropped.contains(&(true, a.faces[t as usize], b.faces[u as usize])));
+        hits.clear();
+        for &(t, u) in &*lying {
+            a.template(t, a_pose, thin);
+            b.template(u, b_pose, other);
+            on_face((b, u, other, b_pose), (a, t, thin, a_pose), false, clip, prediction, hits);
+        }
+        settle(hits, both, thin_body, dropped, &mut take);
     }
     held.sort_unstable_by(|x, y| y.0.total_cmp(&x.0));
     for (gap, features, witness) in held.drain(..) {
@@ -156,14 +165,16 @@ fn near(
 /// A triangle of a surface with its polyhedron and the pose of its body.
 type Triangle<'a> = (&'a Surface, u32, &'a Thin, &'a Pose);
 
-/// Where a triangle of the second surface is nearer than `prediction` in front of one of the first, along the normal of that.
+/// Where a triangle of the second surface is nearer than `prediction` in front of one of the first, along the normal of that; `on_a` says whether the first is that of the pair.
 fn on_face(
     (a, t, first, a_pose): Triangle,
     (b, u, second, b_pose): Triangle,
+    on_a: bool,
     clip: &mut Clip,
     prediction: f64,
-    mut found: impl FnMut([Feature; 2], Witness),
+    hits: &mut Vec<Hit>,
 ) {
+    let faces = (on_a, a.faces[t as usize], b.faces[u as usize]);
     let n = first.posed.normals[0];
     let against = b_pose.local_direction(scale(-1.0, n));
     let facing = dot(against, b.normals[u as usize]) > 1.0 - FACING * FACING;
@@ -184,23 +195,42 @@ fn on_face(
             Feature::Vertex(v) => b.is_top(v, against, STEEP),
             _ => along && b.has_normal(g, against),
         };
-        let met = facing || normal();
-        if met && !a.is_flat(f) && !b.is_flat(g) {
-            found([f, g], witness);
+        if facing || normal() {
+            hits.push(Hit { faces, features: [f, g], witness, flat: a.is_flat(f) || b.is_flat(g) });
         }
     });
 }
 
-/// Whether points that a face of the surface was met at are not behind that face, but behind another one, or behind nothing.
-fn too_deep(
-    list: &[([Feature; 2], Witness)],
-    (a, pose): Placed,
-    other: &Pose,
+/// Hands on the points of faces that meet, and notes those of the others.
+fn settle(
+    hits: &mut [Hit],
+    (a, b): (Placed, Placed),
     thickness: f64,
-) -> bool {
+    dropped: &mut Vec<Faces>,
+    take: &mut impl FnMut([Feature; 2], Witness),
+) {
+    hits.sort_unstable_by_key(|hit| hit.faces);
+    for points in hits.chunk_by(|p, q| p.faces == q.faces) {
+        let on_a = points[0].faces.0;
+        let (first, second) = if on_a { (a, b) } else { (b, a) };
+        if too_deep(points, first, second.1, thickness) {
+            dropped.push(points[0].faces);
+            continue;
+        }
+        for &Hit { features: [f, g], witness, .. } in points.iter().filter(|hit| !hit.flat) {
+            match on_a {
+                true => take([f, g], witness),
+                false => take([g, f], witness.swapped()),
+            }
+        }
+    }
+}
+
+/// Whether points that a face of the surface was met at are not behind that face, but behind another one, or behind nothing.
+fn too_deep(points: &[Hit], (a, pose): Placed, other: &Pose, thickness: f64) -> bool {
     let (mut mean, mut depth) = ([0.0; 3], 0.0);
-    let share = 1.0 / list.len() as f64;
-    for (_, witness) in list {
+    let share = 1.0 / points.len() as f64;
+    for Hit { witness, .. } in points {
         let Witness::Face { other: point, .. } = witness else { continue };
         mean = add(mean, scale(share, pose.local_point(other.point(*point))));
         depth -= share * witness.place(pose, other, [0.0, 0.0, 1.0]).gap;

@@ -5,7 +5,7 @@ use nonsmooth_simulate::{
     Stabilisation, StepStatus, World,
 };
 
-use crate::verification::{ball, block, weightless, world};
+use crate::verification::{G, ball, block, weightless, world};
 
 fn with(world: World, stabilisation: Stabilisation) -> Simulation {
     Simulation::new(world, MoreauJean { stabilisation, ..MoreauJean::default() }).unwrap()
@@ -146,7 +146,8 @@ fn a_tower_that_is_projected_comes_to_rest() {
         assert!(most < 1.001 * first, "{e} {ratio} {h}: {most} of {first}");
         let speeds = simulation.state().velocity.iter().map(|v| nonsmooth_scenes::vec3::norm(*v));
         let fastest = speeds.fold(0.0, f64::max);
-        assert!(fastest < 1e-3, "{e} {ratio} {h}: {fastest:e}");
+        // But for the weight of a step.
+        assert!(fastest < 1.01 * h * G, "{e} {ratio} {h}: {fastest:e}");
     }
 }
 
