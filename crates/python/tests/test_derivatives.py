@@ -338,7 +338,7 @@ def test_a_pattern_that_lacks_a_variable_at_the_solution_is_noticed():
         problem = ns.MCP(f, np.zeros(3), lower=-np.inf, **more)
         return problem, ns.solve(problem, tol=1e-12)
 
-    with pytest.raises(ns.Error, match="row 1 of F: expected to change by .* the pattern lacks a variable"):
+    with pytest.raises(ns.Error, match="row 1 of F: expected to depend at the solution on the variables of its pattern alone"):
         ns.derivative(*make(), "F")
     by_pattern = ns.derivative(*make(pattern=np.ones((3, 3))), "F").matrix("x")
     by_jacobian = ns.derivative(*make(jac=lambda x: np.array([[1, 2.0, 0], [0, 1, 0], [1, 0, 1.0]])), "F").matrix("x")

@@ -85,18 +85,14 @@ pub enum DerivativeError {
     /// F has no Jacobian at the solution.
     #[error("F: expected a Jacobian at the solution, found none")]
     Undefined,
-    /// F does not change as its Jacobian says.
+    /// A row of F depends on a variable that its pattern lacks.
     #[error(
-        "row {} of F: expected to change by {said:.3e} along a small change of x, as the Jacobian says, found {found:.3e}: the pattern lacks a variable that it depends on at the solution, or the Jacobian is another function's",
+        "row {} of F: expected to depend at the solution on the variables of its pattern alone, found that others change it: state the pattern, or a Jacobian",
         row + 1
     )]
-    Mistaken {
+    Uncovered {
         /// From 0.
         row: usize,
-        /// J d.
-        said: f64,
-        /// `F(x + d) − F(x)`
-        found: f64,
     },
     /// The factorisation needs more memory than there is.
     #[error(transparent)]

@@ -311,59 +311,67 @@ pub(super) fn jacobian(field: &dyn Field, x: &[f64]) -> Result<(Vec<f64>, Csc), 
         return Err(DerivativeError::Undefined);
     }
     if field.expressions().is_none() {
-        holds(&mut *run, pattern, x, (&f, &values))?;
+        covers(&mut *run, pattern, x, &f)?;
     }
     let entries = pattern.places().zip(&values).map(|((i, j), &a)| (i, j, a));
     let jacobian = Csc::from_triplets(n, n, entries).map_err(ProblemError::from)?;
     Ok((f, jacobian))
 }
 
-/// A change of all variables, in parts of their size, along which a Jacobian is held against F.
-const CHANGE: f64 = 1.0 / 8192.0;
-/// What it may miss of the change of F, in parts of its terms, and of F itself.
-const ALLOWED: [f64; 2] = [0.1, 1e-9];
+/// Changes of variables, in parts of their size, that rows do not feel whose pattern has none of them: but for this part of the largest row.
+const CHANGE: f64 = 1.0 / 65536.0;
+const UNFELT: f64 = 1e-9;
+/// At most so many sets of variables are changed; up to as many variables each by itself.
+const SETS: usize = 64;
 
-/// A caller's Jacobian, or one by differences in a pattern that was found elsewhere, is a claim: along a change of all variables F has to change as it says, on one side at least, since there may be a
-/// kink. Two values of F.
-fn holds(
+/// A pattern that was found elsewhere, or stated, may lack a variable that a row depends on here; what differences make of the row is then wrong. Sets of variables are changed, to both sides: rows whose pattern has none
+/// of them stay as they are. Beyond [`SETS`] variables the sets are of no order, and such that about a third of the rows have none.
+///
+/// Cost: at most 2 [`SETS`] values of F, none of a dense pattern.
+fn covers(
     run: &mut dyn Evaluator,
     pattern: &Pattern,
     x: &[f64],
-    (f, jacobian): (&[f64], &[f64]),
+    f: &[f64],
 ) -> Result<(), DerivativeError> {
-    let sizes = || x.iter().map(|x| x.abs()).filter(|x| *x > 0.0);
-    let least = sizes().fold(f64::INFINITY, f64::min);
-    let least = if least.is_finite() { least } else { 1.0 };
-    // Of no order, and never the same twice.
-    let d: Vec<f64> = (0..x.len())
-        .map(|j| {
-            let part = (0.618_033_988_749_895 * (j + 1) as f64).fract();
-            let sign = if (j * j / 2 + j).is_multiple_of(2) { 1.0 } else { -1.0 };
-            CHANGE * sign * (0.5 + 0.5 * part) * if x[j] != 0.0 { x[j].abs() } else { least }
-        })
-        .collect();
-    let mut there = |sign: f64| {
-        let y: Vec<f64> = x.iter().zip(&d).map(|(x, d)| x + sign * d).collect();
-        let mut value = vec![f64::NAN; x.len()];
-        tentatively(|| run.value(&y, &mut value)).then_some(value)
+    let n = x.len();
+    let widest = (0..n).map(|i| pattern.row(i).len()).max().unwrap_or(0);
+    if (0..n).all(|i| pattern.row(i).len() == n) {
+        return Ok(());
+    }
+    let mean = x.iter().map(|x| x.abs()).sum::<f64>() / n as f64;
+    let unit = |j: usize| match (x[j].abs(), mean) {
+        (own, _) if own > 0.0 => own,
+        (_, mean) if mean > 0.0 => mean,
+        _ => 1.0,
     };
-    let sides = [(1.0, there(1.0)), (-1.0, there(-1.0))];
-    for (row, &before) in f.iter().enumerate() {
-        let terms = jacobian[pattern.range(row)].iter().zip(pattern.row(row));
-        let (mut said, mut moduli, mut size) = (0.0, 0.0, before.abs());
-        for (a, &j) in terms {
-            said += a * d[j];
-            moduli += (a * d[j]).abs();
-            size += (a * x[j]).abs();
+    let among = |set: usize, j: usize| match n <= SETS {
+        true => set == j,
+        false => {
+            let hash = ((set * n + j) as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+            (hash ^ hash >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32
+                < u64::from(u32::MAX) / (widest as u64 + 1)
         }
-        let changes = sides.iter().filter_map(|(sign, value)| {
-            value.as_ref().map(|value| sign * (value[row] - before)).filter(|c| c.is_finite())
-        });
-        let misses = |change: &f64| (change - said).abs() > ALLOWED[0] * moduli + ALLOWED[1] * size;
-        if let Some(found) = changes.clone().next()
-            && changes.clone().all(|change| misses(&change))
-        {
-            return Err(DerivativeError::Mistaken { row, said, found });
+    };
+    let (mut y, mut there) = (x.to_vec(), vec![0.0; n]);
+    for set in 0..n.min(SETS) {
+        for sign in [1.0, -1.0] {
+            if budget::over() {
+                return Err(DerivativeError::Interrupted);
+            }
+            for (j, (y, x)) in y.iter_mut().zip(x).enumerate() {
+                *y = if among(set, j) { x + sign * CHANGE * unit(j) } else { *x };
+            }
+            if !tentatively(|| run.value(&y, &mut there)) {
+                continue;
+            }
+            let sizes = f.iter().chain(&there).map(|f| f.abs()).filter(|f| f.is_finite());
+            let largest = sizes.fold(0.0, f64::max);
+            let changed = |i: &usize| (there[*i] - f[*i]).abs() > UNFELT * largest;
+            let feels = |i: &usize| pattern.row(*i).iter().any(|&j| among(set, j));
+            if let Some(row) = (0..n).filter(changed).find(|i| !feels(i)) {
+                return Err(DerivativeError::Uncovered { row });
+            }
         }
     }
     Ok(())

@@ -5,8 +5,8 @@
 //! features, so that nothing is met across an edge that is not there.
 //!
 //! A triangle does not say how deep a body is behind it. What is deeper than a share of the thinner body is no contact; and of two faces that a point is behind the nearer one is
-//! met: a corner that has sunk a little into the top of a box is not far behind its side. That is asked of all points of two plane faces together, by their mean, however they are cut into triangles: those of a triangle may all
-//! be at the edge of its face, which is flush with one of the other body. Two edges that are near a face so are met all the same, the least deep first, where nothing
+//! met: a corner that has sunk a little into the top of a box is not far behind its side. That is asked of all points of two plane faces together, by their mean and each, however they are cut into triangles: those of a triangle
+//! may all be at the edge of its face, which is flush with one of the other body. Two edges that are near a face so are met all the same, the least deep first, where nothing
 //! else is met within their depth.
 //!
 //! Cost: the pairs of triangles that are near each other, times the logarithm of all.
@@ -230,13 +230,20 @@ fn settle(
 fn too_deep(points: &[Hit], (a, pose): Placed, other: &Pose, thickness: f64) -> bool {
     let (mut mean, mut depth) = ([0.0; 3], 0.0);
     let share = 1.0 / points.len() as f64;
-    for Hit { witness, .. } in points {
-        let Witness::Face { other: point, .. } = witness else { continue };
-        mean = add(mean, scale(share, pose.local_point(other.point(*point))));
-        depth -= share * witness.place(pose, other, [0.0, 0.0, 1.0]).gap;
+    let place = |hit: &Hit| match &hit.witness {
+        Witness::Face { other: point, .. } => Some(pose.local_point(other.point(*point))),
+        _ => None,
+    };
+    for (hit, place) in points.iter().filter_map(|hit| place(hit).map(|place| (hit, place))) {
+        mean = add(mean, scale(share, place));
+        depth -= share * hit.witness.place(pose, other, [0.0, 0.0, 1.0]).gap;
     }
+    // In the middle of a face that goes round a corner, or a hole, another one may be near that few of the points are.
+    let own = points[0].faces.1;
     depth > DEEP * thickness
-        || (depth > SHALLOW * thickness && a.is_within(mean, NEARER[0] * depth))
+        || (depth > SHALLOW * thickness
+            && a.is_within(mean, NEARER[0] * depth)
+            && a.another_is_near(own, points.iter().filter_map(place), depth))
 }
 
 /// The edges of two triangles, each of the pairs of a surface once.
@@ -308,6 +315,27 @@ impl Surface {
 
     /// Whether some triangle is nearer to x, in the frame of the body, than `radius`.
     fn is_within(&self, x: Vec3, radius: f64) -> bool {
+        self.some_within(x, radius, |_| true)
+    }
+
+    /// Whether one plane face, not `own`, is nearer to all these points than `radius`.
+    fn another_is_near(
+        &self,
+        own: u32,
+        mut points: impl Iterator<Item = Vec3> + Clone,
+        radius: f64,
+    ) -> bool {
+        points.next().is_some_and(|first| {
+            self.some_within(first, radius, |t| {
+                let face = self.faces[t as usize];
+                let is_of_it = |t: u32| self.faces[t as usize] == face;
+                face != own && points.clone().all(|x| self.some_within(x, radius, is_of_it))
+            })
+        })
+    }
+
+    /// Whether `which` is true of some triangle that is nearer to x than `radius`.
+    fn some_within(&self, x: Vec3, radius: f64, which: impl Fn(u32) -> bool) -> bool {
         let mut stack = vec![0_u32];
         while let Some(k) = stack.pop() {
             let node = &self.tree[k as usize];
@@ -321,7 +349,7 @@ impl Surface {
                 0 => stack.extend([node.first, node.first + 1]),
                 n => {
                     let own = &self.order[node.first as usize..(node.first + n) as usize];
-                    if own.iter().any(|&t| self.distance(t, x) < radius) {
+                    if own.iter().any(|&t| self.distance(t, x) < radius && which(t)) {
                         return true;
                     }
                 }
