@@ -159,7 +159,11 @@ def test_a_simulation_goes_back_to_a_checkpoint():
     "given, said",
     [
         ({"forces": [0, 0, 1]}, "forces: expected finite numbers, bodies × 3 = 2 × 3, found (3,)"),
-        ({"torques": "up"}, "torques: expected finite numbers, bodies × 3 = 2 × 3, found 'up'"),
+        ({"torques": "up"}, "torques: expected an array of real numbers, found <U2"),
+        (
+            {"forces": np.ma.masked_array(np.zeros((2, 3)), mask=np.eye(2, 3, dtype=bool))},
+            "forces: expected an array of real numbers, found a masked array (filled() says what stands for what is masked)",
+        ),
         ({"torques": [[0, 0, 0], [0, np.inf, 0]]}, "torques[1, 1]: expected a finite number, found inf"),
     ],
 )

@@ -435,13 +435,9 @@ class Simulation:
         """A vector of the space for each body."""
         if value is None:
             return None
-        expected = f"finite numbers, bodies × 3 = {len(self.bodies)} × 3"
-        try:
-            rows = np.ascontiguousarray(value, dtype=float)
-        except (TypeError, ValueError):
-            raise arguments.mistake(place, expected, value) from None
+        rows = np.ascontiguousarray(_nonsmooth.reals(place, value))
         if rows.shape != (len(self.bodies), 3):
-            raise arguments.mistake(place, expected, rows.shape)
+            raise arguments.mistake(place, f"finite numbers, bodies × 3 = {len(self.bodies)} × 3", rows.shape)
         if not np.isfinite(rows).all():
             body, axis = np.argwhere(~np.isfinite(rows))[0]
             raise arguments.mistake(f"{place}[{body}, {axis}]", "a finite number", float(rows[body, axis]))
