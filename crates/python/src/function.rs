@@ -48,7 +48,7 @@ thread_local! {
 }
 
 /// What a thread that panicked left is whole all the same: it is written in one go.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

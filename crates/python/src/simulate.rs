@@ -4,7 +4,7 @@
 //! that asks waits, sees Ctrl-C, and runs the callback of each step.
 
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::time::Instant;
 
 use nonsmooth_io::ProblemFile;
@@ -18,7 +18,7 @@ use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::function::Watcher;
+use crate::function::{Watcher, locked};
 use crate::wait::{ask, elsewhere};
 use crate::{expected, mistake};
 
@@ -106,8 +106,8 @@ pub struct Simulation {
     scene: Arc<SceneFile>,
     /// What all runs begin with: to write the scene down takes as long as many steps.
     begun: OnceLock<Trajectory>,
-    /// What the caller has act in the step that is done.
-    asked: Arc<Mutex<Asked>>,
+    /// What the caller has act in the step that is done, once there was something.
+    asked: OnceLock<Arc<Mutex<Asked>>>,
 }
 
 /// Forces at the mass centres (N) and torques about them (N·m) in the frame of the world, of all bodies or of none.
@@ -156,22 +156,14 @@ impl Simulation {
     }
 }
 
-/// What a thread that panicked left is whole all the same: it is written in one go.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
 #[pymethods]
 impl Simulation {
     /// The simulation of a scene, a JSON document; `settle` moves bodies apart that overlap.
     #[new]
     fn new(py: Python<'_>, scene: &str, settle: bool) -> PyResult<Self> {
         let scene = Arc::new(SceneFile::parse(scene, &[]).map_err(mistake)?);
-        let asked = Arc::new(Mutex::new(Asked::default()));
-        let acts = asked.clone();
-        let force = move |_: &State, wrenches: &mut Wrenches| locked(&acts).add(wrenches);
-        let inner = Mutex::new(Some(built(py, &scene, settle)?.with_force(force)));
-        Ok(Self { inner, scene, begun: OnceLock::new(), asked })
+        let inner = Mutex::new(Some(built(py, &scene, settle)?));
+        Ok(Self { inner, scene, begun: OnceLock::new(), asked: OnceLock::new() })
     }
 
     /// The time, s.
@@ -293,8 +285,17 @@ impl Simulation {
         forces: Option<PyReadonlyArray2<'_, f64>>,
         torques: Option<PyReadonlyArray2<'_, f64>>,
     ) -> PyResult<Step> {
-        let simulation = locked(&self.inner).take().ok_or_else(busy)?;
-        *locked(&self.asked) = Asked { forces: rows(forces), torques: rows(torques) };
+        let mut simulation = locked(&self.inner).take().ok_or_else(busy)?;
+        if forces.is_some() || torques.is_some() {
+            let known = self.asked.get().is_some();
+            let asked = self.asked.get_or_init(Arc::default);
+            *locked(asked) = Asked { forces: rows(forces), torques: rows(torques) };
+            if !known {
+                let acts = asked.clone();
+                let force = move |_: &State, wrenches: &mut Wrenches| locked(&acts).add(wrenches);
+                simulation = simulation.with_force(force);
+            }
+        }
         let watcher = Arc::new(Watcher::default());
         let limits = self.limits(&watcher);
         let hear = |_: Option<()>| ask(&watcher, |_| Ok(false));
@@ -309,7 +310,9 @@ impl Simulation {
                 (simulation, done)
             })
         });
-        *locked(&self.asked) = Asked::default();
+        if let Some(asked) = self.asked.get() {
+            *locked(asked) = Asked::default();
+        }
         *locked(&self.inner) = Some(simulation);
         match watcher.fault() {
             Some(fault) => Err(fault),

@@ -3,12 +3,12 @@
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, SendError, Sender, channel, sync_channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
 use pyo3::prelude::*;
 
-use crate::function::Watcher;
+use crate::function::{Watcher, locked};
 
 /// How often Ctrl-C is looked for.
 pub const TICK: Duration = Duration::from_millis(20);
@@ -40,7 +40,7 @@ static IDLE: Mutex<Idle> = Mutex::new(Idle { process: 0, threads: vec![] });
 
 impl Idle {
     fn now() -> MutexGuard<'static, Self> {
-        let mut idle = IDLE.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut idle = locked(&IDLE);
         let process = std::process::id();
         if idle.process != process {
             *idle = Self { process, threads: vec![] };

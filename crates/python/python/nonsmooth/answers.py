@@ -49,9 +49,9 @@ class Unsolved(RuntimeError):
     """An answer that the judge does not accept; see :meth:`Answer.raise_if_unsolved`."""
 
     def __init__(self, answer: Answer) -> None:
-        fails = _fails(answer)
+        failing = _failing(answer)
         super().__init__(
-            f"{answer.message}; relative residual {answer.residual:.3g}" + (f"; {fails}" if fails else "")
+            f"{answer.message}; relative residual {answer.residual:.3g}" + (f"; fails {failing}" if failing else "")
         )
         self.answer = answer
 
@@ -59,10 +59,9 @@ class Unsolved(RuntimeError):
         return Unsolved, (self.answer,)
 
 
-def _fails(answer: Answer) -> str:
+def _failing(answer: Answer) -> str:
     """What else than the relative residual the judge does not accept, in the words of the command line."""
-    said = ", ".join(f"{what} {value:.3g}" for what, value in answer._native.failing)
-    return f"fails {said}" if said else ""
+    return ", ".join(f"{what} {value:.3g}" for what, value in answer._native.failing)
 
 
 class Table(np.ndarray[Any, np.dtype[np.void]]):
@@ -256,10 +255,10 @@ class Answer:
         return [*super().__dir__(), *self.parts]
 
     def __repr__(self) -> str:
-        fails = _fails(self)
+        failing = _failing(self)
         return (
             f"<Answer: {self.status}, residual {self.residual:.2e}, "
-            + (f"{fails}, " if fails else "")
+            + (f"fails {failing}, " if failing else "")
             + f"{self.iterations} iterations, {self.seconds:.3g} s>"
         )
 
@@ -270,8 +269,8 @@ class Answer:
             ("work", f"{self.iterations} iterations, {self.seconds:.3g} s"),
             ("counts", ", ".join(f"{n} {name}" for name, n in self.counts.items() if n)),
         ]
-        if fails := _fails(self):
-            rows.insert(2, ("fails", fails.removeprefix("fails ")))
+        if failing := _failing(self):
+            rows.insert(2, ("fails", failing))
         said = "".join(f"<li>{html.escape(line)}</li>" for line in self.account)
         return _table("Answer", rows) + (f"<ul>{said}</ul>" if said else "")
 
