@@ -7,7 +7,7 @@ use nonsmooth_analysis::{Indeterminacy, Regularity};
 /// `1 contact`, `2 contacts`.
 pub use nonsmooth_bench::plural as count;
 use nonsmooth_io::ProblemFile;
-use nonsmooth_problem::check::{self, Failing, Measure};
+use nonsmooth_problem::check::{self, Failing, Measure, RELATIVE};
 use nonsmooth_problem::{
     AnyCounts, AnyPoint, AnyProblem, AnyStatus, GlobalPoint, LocalPoint, Problem, Stated,
     with_complementarity,
@@ -155,25 +155,12 @@ pub fn residual_json(measure: &Measure) -> Object {
     all
 }
 
-/// The criterion of the contacts that comes first.
-const RELATIVE: &str = "relative residual";
-
-/// What fails at `tolerance`: whether the relative residual does, and what else. Where it does, primal and dual
-/// residuals are only parts of it.
-fn failing(measure: &Measure, tolerance: f64) -> (bool, Vec<Failing>) {
-    let (relative, mut others): (Vec<_>, Vec<_>) =
-        measure.failing(tolerance).into_iter().partition(|f| f.what == RELATIVE);
-    let relative = !relative.is_empty();
-    others.retain(|f| !(relative && ["primal", "dual"].contains(&f.what)));
-    (relative, others)
-}
-
 /// The first line on a point: the file, what came of it, and what the judge's decision rests on.
 pub fn headline(file: &Path, says: &str, measure: &Measure, tolerance: f64) -> String {
     if *measure == Measure::unknown() {
         return format!("{}: {says} (the point was not judged)\n", file.display());
     }
-    let others = match listed(&failing(measure, tolerance).1, |_| String::new()) {
+    let others = match listed(&measure.failing_beside(tolerance).1, |_| String::new()) {
         none if none.is_empty() => none,
         others => format!("; fails {others}"),
     };
@@ -210,7 +197,7 @@ pub fn verdict_text(
     } else {
         row(text, "residual", "not judged: the limit had passed");
     }
-    let (relative, others) = failing(&verdict.measure, tolerance);
+    let (relative, others) = verdict.measure.failing_beside(tolerance);
     if judged_at_all && !others.is_empty() {
         let limit = |f: &Failing| {
             let limit = format!("limit {:.1e}", f.limit).replace(".0e", "e");

@@ -247,13 +247,8 @@ impl Answer {
     /// What else than the relative residual is beyond its limit, with its value. Of a relative residual that is, primal and dual are only parts.
     #[getter]
     fn failing(&self) -> Vec<(&'static str, f64)> {
-        let measure = &self.answer.verdict.measure;
-        let mut parts = vec!["relative residual"];
-        if measure.relative.is_nan() || measure.relative > self.tolerance {
-            parts.extend(["primal", "dual"]);
-        }
-        let failing = measure.failing(self.tolerance).into_iter();
-        failing.filter(|f| !parts.contains(&f.what)).map(|f| (f.what, f.value)).collect()
+        let (_, others) = self.answer.verdict.measure.failing_beside(self.tolerance);
+        others.into_iter().map(|f| (f.what, f.value)).collect()
     }
 
     /// The kind of the problem.

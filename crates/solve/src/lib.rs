@@ -44,12 +44,13 @@ pub use door::{Answer, Kept, Solvable, Solve, solve};
 pub use multistart::{Found, multistart};
 
 pub use self::core::boxed::Boxed;
-pub use self::core::drive::{
-    Driver, Limit, Limits, Observer, Outcome, Progress, Sample, Session, Status, THREADS_MOST,
-};
+pub use self::core::drive::Driver;
 pub use self::core::error::SolveError;
+pub use self::core::limits::{Limit, Limits, THREADS_MOST};
 pub use self::core::reformulation::Reformulation;
+pub use self::core::session::{Observer, Progress, Sample, Session};
 pub use self::core::solver::{Solver, Step};
+pub use self::core::status::{Outcome, Status};
 pub use self::core::via::Via;
 pub use self::core::via_session::ViaSession;
 pub use self::core::{guard, line_search, settings, spelling, trace};

@@ -9,6 +9,8 @@ use nonsmooth_problem::{
     Bounds, BoxLcp, FrictionGlobal, FrictionLocal, GlobalPoint, Hlcp, HlcpPoint, Lcp, LcpPoint,
     LocalPoint, Mcp, Mlcp, ProblemError,
 };
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
 
 use super::DerivativeError;
 use super::equations::{Column, Columns, Equation, LOWER, UPPER};
@@ -345,22 +347,19 @@ fn covers(
         (_, mean) if mean > 0.0 => mean,
         _ => 1.0,
     };
-    let among = |set: usize, j: usize| match n <= SETS {
-        true => set == j,
-        false => {
-            let hash = ((set * n + j) as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-            (hash ^ hash >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32
-                < u64::from(u32::MAX) / (widest as u64 + 1)
-        }
-    };
-    let (mut y, mut there) = (x.to_vec(), vec![0.0; n]);
+    let mut lot = Pcg64::seed_from_u64(1);
+    let share = 1.0 / (widest as f64 + 1.0);
+    let (mut y, mut there, mut among) = (x.to_vec(), vec![0.0; n], vec![false; n]);
     for set in 0..n.min(SETS) {
+        for (j, among) in among.iter_mut().enumerate() {
+            *among = if n <= SETS { j == set } else { lot.random_bool(share) };
+        }
         for sign in [1.0, -1.0] {
             if budget::over() {
                 return Err(DerivativeError::Interrupted);
             }
             for (j, (y, x)) in y.iter_mut().zip(x).enumerate() {
-                *y = if among(set, j) { x + sign * CHANGE * unit(j) } else { *x };
+                *y = if among[j] { x + sign * CHANGE * unit(j) } else { *x };
             }
             if !tentatively(|| run.value(&y, &mut there)) {
                 continue;
@@ -368,7 +367,7 @@ fn covers(
             let sizes = f.iter().chain(&there).map(|f| f.abs()).filter(|f| f.is_finite());
             let largest = sizes.fold(0.0, f64::max);
             let changed = |i: &usize| (there[*i] - f[*i]).abs() > UNFELT * largest;
-            let feels = |i: &usize| pattern.row(*i).iter().any(|&j| among(set, j));
+            let feels = |i: &usize| pattern.row(*i).iter().any(|&j| among[j]);
             if let Some(row) = (0..n).filter(changed).find(|i| !feels(i)) {
                 return Err(DerivativeError::Uncovered { row });
             }

@@ -96,6 +96,10 @@ pub struct Measure {
     pub worst: f64,
 }
 
+/// The name of the criterion that comes first.
+pub const RELATIVE: &str = "relative residual";
+/// Those of its parts.
+const PARTS: [&str; 2] = ["primal", "dual"];
 /// The name of the criterion of each contact by its own terms.
 pub const OWN: &str = "own residual of a contact or row";
 
@@ -154,9 +158,9 @@ impl Measure {
     fn criteria(&self, tolerance: f64) -> impl Iterator<Item = Failing> {
         let rounding = self.dynamics_rounding.unwrap_or(0.0).max(DYNAMICS_TOLERANCE);
         [
-            ("relative residual", Some(self.relative), tolerance),
-            ("primal", Some(self.primal), tolerance),
-            ("dual", Some(self.dual), tolerance),
+            (RELATIVE, Some(self.relative), tolerance),
+            (PARTS[0], Some(self.primal), tolerance),
+            (PARTS[1], Some(self.dual), tolerance),
             ("bilateral constraints", self.bilateral, tolerance),
             (OWN, self.own, tolerance.sqrt()),
             ("velocities", self.velocity_gap, tolerance),
@@ -182,6 +186,15 @@ impl Measure {
     pub fn failing(&self, tolerance: f64) -> Vec<Failing> {
         // A NaN is not within any limit.
         self.criteria(tolerance).filter(|c| c.value.is_nan() || c.value > c.limit).collect()
+    }
+
+    /// Whether the relative residual is beyond the tolerance, and what else fails. Where it is, primal and dual residuals are only parts of it, and are left out.
+    pub fn failing_beside(&self, tolerance: f64) -> (bool, Vec<Failing>) {
+        let (relative, mut others): (Vec<_>, Vec<_>) =
+            self.failing(tolerance).into_iter().partition(|f| f.what == RELATIVE);
+        let relative = !relative.is_empty();
+        others.retain(|f| !(relative && PARTS.contains(&f.what)));
+        (relative, others)
     }
 
     /// One number to compare two points of the same problem: the largest of the values that are compared with the

@@ -22,7 +22,7 @@ use nonsmooth_problem::check::{
     Certificate, ConeSystem, Evidence, Exact, ExactVector, Proof, rounded,
 };
 
-use crate::core::drive::is_final;
+use crate::core::status::is_final;
 use crate::{Limits, Outcome, Status};
 
 /// How the enumeration ended.

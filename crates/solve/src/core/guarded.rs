@@ -8,8 +8,8 @@ use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
 use super::register::bare;
-use crate::core::drive::Meter;
 use crate::core::guard::{self, locked};
+use crate::core::meter::Meter;
 use crate::core::register::Registered;
 use crate::core::settings::SettingsMap;
 use crate::core::trace::Trace;

@@ -7,10 +7,13 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{History, MODEST, Meter, fallen_back, is_final, is_hopeless, or_start};
+use crate::core::drive::is_hopeless;
+use crate::core::meter::Meter;
 use crate::core::register::{self, Registered};
 use crate::core::settings::SettingsMap;
+use crate::core::status::{MODEST, is_final};
 use crate::core::trace::Trace;
+use crate::core::visits::{History, fallen_back, or_start};
 use crate::{Limit, Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
 
 /// A solver of a plan.

@@ -9,10 +9,11 @@ use nonsmooth_problem::{Kind, Problem};
 use serde::Serialize;
 
 use crate::core::boxed::Boxed;
-use crate::core::drive::{Driver, Session};
+use crate::core::drive::Driver;
 use crate::core::error::SolveError;
 use crate::core::guarded::Guarded;
 use crate::core::reformulation::Reformulation;
+use crate::core::session::Session;
 use crate::core::settings::{Setting, Settings, SettingsMap, described, parse};
 use crate::core::solver::Solver;
 use crate::core::spelling::meant;

@@ -108,8 +108,15 @@ fn corrected(
         {
             *value = (x as u64).into();
         }
-        if !reads(&SettingsMap::from_iter([(key.clone(), value.clone())])) {
-            return Err(format!("{key}: expected {}, found {value}", setting.expected()));
+        let takes = |value: &Value| reads(&SettingsMap::from_iter([(key.clone(), value.clone())]));
+        if !takes(value) {
+            // Of a number that is whole, its type's upper end is what is missed.
+            let whole = setting.default.is_u64()
+                && value.as_f64().is_some_and(|x| x >= 0.0 && x.fract() == 0.0);
+            let ends = [u64::MAX, u32::MAX.into(), u16::MAX.into(), u8::MAX.into()];
+            let most = ends.into_iter().filter(|_| whole).find(|most| takes(&(*most).into()));
+            let most = most.map_or_else(String::new, |most| format!(" and at most {most}"));
+            return Err(format!("{key}: expected {}{most}, found {value}", setting.expected()));
         }
     }
     Ok(map)
@@ -179,5 +186,16 @@ mod tests {
         let nsgs: crate::contact::splitting::Nsgs =
             parse(&from_texts(&["seed=1e3"]).unwrap()).unwrap();
         assert_eq!(nsgs.seed, 1000);
+    }
+
+    #[test]
+    fn numbers_that_are_too_large_are_told_the_end() {
+        let refused = |text: &str| {
+            parse::<crate::contact::splitting::Nsgs>(&from_texts(&[text]).unwrap()).unwrap_err()
+        };
+        let end = "expected a whole number of at least 0 and at most 4294967295, found 5000000000";
+        assert_eq!(refused("freeze_for=5000000000"), format!("freeze_for: {end}"));
+        let sign = "expected a whole number of at least 0, found -1";
+        assert_eq!(refused("freeze_for=-1"), format!("freeze_for: {sign}"));
     }
 }

@@ -3,8 +3,8 @@
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{Calibration, closely};
 use crate::core::trace::Trace;
+use crate::core::visits::{Calibration, closely};
 use crate::{Reformulation, SolveError, Solver, Step};
 
 /// `Via { reformulation, solver }` reduces a problem of type `P`, lets `solver` work on the other problem, and

@@ -6,8 +6,10 @@ use std::time::Instant;
 use nonsmooth_problem::Problem;
 use nonsmooth_problem::check::Measure;
 
-use crate::core::drive::{Meter, concluded, fallen_back};
+use crate::core::meter::Meter;
+use crate::core::status::concluded;
 use crate::core::trace::Trace;
+use crate::core::visits::fallen_back;
 use crate::{
     Limit, Limits, Observer, Outcome, Progress, Reformulation, Sample, Session, SolveError, Status,
 };

@@ -27,11 +27,11 @@ use nonsmooth_problem::{FrictionGlobal, GlobalPoint, Problem};
 
 use super::starts::{Halvings, lost};
 use super::{Auto, HybridWork, Stage};
-use crate::Step;
 use crate::contact::form::{Access, Contacts, Disked, Linearised, OnContacts};
 use crate::contact::law::DiskLaw;
 use crate::contact::parts::Central;
-use crate::core::drive::{Driver, Limits, Session, Status};
+use crate::core::drive::Driver;
+use crate::{Limits, Session, Status, Step};
 
 /// Motion and impulses in turn have come near enough for Newton's iterations; where the impulses of rest come no nearer than this, nearly all moves.
 const TURNED: f64 = 1e-6;

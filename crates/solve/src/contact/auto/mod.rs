@@ -14,7 +14,7 @@
 //! 3. **Trial**: Newton's iterations of stage 5 without its proximal term, where the sweeps came near or the structure is not hyperstatic, until three in a row have not halved the error; there sweeps come to
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter, from well inside the cones about the impulses so far: some 8 to 20 iterations lead near the solution of a problem
-//!    at rest; where the central path turns back it is left again. Where it failed and little slides, on the convex relaxation (s = 0, `relaxed.rs`), whose path does not: where nothing slides its solution
+//!    at rest; where the central path turns back it is left again. Where it failed far off, or little slides, on the convex relaxation (s = 0, `relaxed.rs`), whose path does not: where nothing slides its solution
 //!    obeys the law; where it comes near, stages 8, sweeps with one projection and 9 come next, which find what little slides.
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems. Steps are whole where W has no spread (walls, columns, arches), else shortened by a line search.
@@ -55,6 +55,7 @@ mod proximal_newton;
 mod relaxed;
 mod starts;
 
+use nonsmooth_linalg::budget::Pace;
 use nonsmooth_linalg::{Groups, budget};
 use nonsmooth_problem::check::{Existence, Kinematic};
 use schemars::JsonSchema;
@@ -218,6 +219,7 @@ pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
     from_here: bool,
     /// Subproblems in a row that ended within the tolerance and were not enough.
     refused: u32,
+    pace: Pace,
     done: Done,
 }
 
@@ -324,6 +326,7 @@ impl<P: Linearised<D> + Disked<D> + Kinematic<D> + Parted<D> + Send, const D: us
             passed_by: None,
             from_here: false,
             refused: 0,
+            pace: Pace::default(),
             done: Done::default(),
             state,
         })
@@ -539,6 +542,8 @@ impl<const D: usize> OnContacts<Auto, D> {
             self.accelerate(problem, point, work);
         }
         let together = work.sweep.together(SWEEPS_A_STEP);
+        // At most: of a small problem the clock is looked at by the loop alone.
+        let passes = together as f64 * (problem.unknowns() as f64).powi(2);
         let mut left = SWEEPS_A_STEP;
         while left > 0 {
             if self.accelerate_early(problem, point, work) {
@@ -549,7 +554,7 @@ impl<const D: usize> OnContacts<Auto, D> {
             let moves = work.sweep.sweeps(problem, &mut work.state, r, together)
                 + sweep_rows(problem, &mut work.state, (r, lambda), 1.0);
             work.done.sweeps += together;
-            if budget::over() {
+            if work.pace.over(passes) {
                 break;
             }
             estimate = moves.sqrt() / work.scale;

@@ -1,4 +1,4 @@
-//! The convex relaxation where the interior point on the exact law has failed: its path turns back where contacts between sliding and sticking are many, the convex one never does. Where nothing slides at the
+//! The convex relaxation where the interior point on the exact law has failed, far from a solution or where little slides: its path turns back where contacts between sliding and sticking are many, the convex one never does. Where nothing slides at the
 //! solution the two have the same; where little slides the relaxation's is near, and alternating directions, sweeps with one projection a contact, both from zero, and motion and impulses in turn come before
 //! Newton's iterations, which do not end there. Pyramids of spheres at rest and hit.
 
@@ -11,6 +11,8 @@ use crate::contact::form::{Disked, Linearised, OnContacts};
 
 /// The interior point has failed above this error.
 const FAILED_ABOVE: f64 = 1e-3;
+/// Above this one it tells nothing of how much slides. On 340 problems, most of them of mass ratios to 10⁶ and rolling friction, .3 leaves one of six unsolved that .1 solves, and .03 solves one more.
+const FAILED_FAR_ABOVE: f64 = 0.03;
 /// More than this part of ‖q‖ slides in flows and piles, for which the relaxation is of no use: .4 to .6 of it in chutes and in piles that are hit, .02 to .26 in pyramids of spheres.
 const SLIDING: f64 = 0.3;
 /// Little slides where the relaxation comes nearer than this: 3e-3 to 6e-3 in pyramids of spheres with mu = .6, at .4 and where they are shaken .01 and more.
@@ -36,7 +38,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         let failed = done.interior_error > FAILED_ABOVE && done.relaxed == 0;
         let relaxes = failed && {
             newton.look(problem, state, r);
-            newton.sliding(r) < SLIDING
+            done.interior_error > FAILED_FAR_ABOVE || newton.sliding(r) < SLIDING
         };
         take(central.best(), controller, r);
         *still = false;

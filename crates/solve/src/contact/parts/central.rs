@@ -4,8 +4,10 @@
 //! K* ∋ W r + q + mu s e_N  ⟂  r ∈ K,     s = ‖u_T‖ (Coulomb's law)  or  s given (the convex problem).
 //! ```
 //!
-//! In the scaled coordinates `x = X r`, `z = Z ũ`, `X = (w_c/υ) diag(mu, 1, 1)`, `Z = diag(1/mu, 1, 1)/υ`, `υ = ‖q‖/√nc`, both cones are
-//! `L = {x_N ≥ ‖x_T‖}` and `xᵀz` is the power `rᵀũ` in units of `υ²/w_c`. The unknowns are x and z inside L with
+//! In the scaled coordinates `x = X r`, `z = Z ũ`, `X = f_c (w_c/υ) diag(mu, 1, 1)`, `Z = f_c diag(1/mu, 1, 1)/υ`, `υ = ‖q‖/√nc`, both cones are
+//! `L = {x_N ≥ ‖x_T‖}` and `xᵀz` is the power `rᵀũ` in units of `υ²/(f_c² w_c)`. f_c is a power of two near `√(w̄/w_c)`, w̄ the geometric mean of the w_c: the central path
+//! gives all contacts about the same power, in units of `υ²/w̄`. (With `f_c = 1` it gives a contact of a part 10⁶ times as heavy 10⁶ times as much as one of a light part, and ends far from the solution.)
+//! The unknowns are x and z inside L with
 //!
 //! ```text
 //! ρ = z − s e_N − Z (W r + q) = 0,     x ∘ z = τ e,  τ → 0,
@@ -28,8 +30,8 @@
 //!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
 //!
-//! With rolling friction a contact has two cones that share r_N: `x_k = A_k x̂`, `A_k = diag(mu_k in N, 1 in disk k)`, `x̂ = w_c r/υ`, and the normal velocity is split
-//! between them, `ẑ = Σ A_k z_k`. Complementarity eliminates the split: `(T w_c/υ + G W/υ) dr = Σ A_k S_k d_k + G ρ` with `T = Σ A_k S_k² A_k`,
+//! With rolling friction a contact has two cones that share r_N: `x_k = A_k x̂`, `A_k = diag(mu_k in N, 1 in disk k)`, `x̂ = f_c w_c r/υ`, and the normal velocity is split
+//! between them, `ẑ = Σ A_k z_k`. Complementarity eliminates the split: `f_c (T w_c/υ + G W/υ) dr = Σ A_k S_k d_k + G ρ` with `T = Σ A_k S_k² A_k`,
 //! whose eigenvectors take the place of those of S.
 //!
 //! References: NesterovTodd1998; Mehrotra1992; TutuncuTohTodd2003 (formulas for the second-order cone). G and the exact law: the
@@ -78,10 +80,10 @@ pub struct Central<L, const D: usize> {
     /// What δ is that multiple of in place of τ, where a path is followed.
     pub(in crate::contact) theta: Option<f64>,
     delta: f64,
-    /// X/mu and Z mu, one number each per contact: `w_c/υ` and mu; `1/υ` is shared.
+    /// Of each contact X in the disk, `f_c w_c/υ`, and Z there, `f_c/υ`.
     weight: Vec<f64>,
+    speed: Vec<f64>,
     laws: Vec<L>,
-    inverse_speed: f64,
     s: Vec<f64>,
     /// Of each disk of each contact, in the rows N and those of the disk; and all that is a pair's.
     pub(in crate::contact) pairs: Vec<Pair<D>>,
@@ -118,8 +120,8 @@ impl<L, const D: usize> Default for Central<L, D> {
             theta: None,
             delta: 0.0,
             weight: vec![],
+            speed: vec![],
             laws: vec![],
-            inverse_speed: 1.0,
             s: vec![],
             pairs: vec![],
             scalings: vec![],
@@ -214,11 +216,10 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     ) -> Iterate {
         let n = problem.contacts();
         self.scale = problem.velocity_scale(state);
-        self.inverse_speed = (n as f64).sqrt() / self.scale;
         self.laws.clear();
         self.laws.extend((0..n).map(|c| problem.law(c)));
         problem.units(state, &mut self.weight);
-        self.weight.iter_mut().for_each(|w| *w *= self.inverse_speed);
+        self.balance((n as f64).sqrt() / self.scale);
         let zero = [0.0; D];
         self.rho.clear();
         self.rho.resize(n, zero);
@@ -275,6 +276,20 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         self.scalings.extend(self.pairs.iter().map(Scaling::new));
         self.best_error = f64::INFINITY;
         self.look(problem, state, 0.0)
+    }
+
+    /// X and Z of the contacts, whose w_c stand in `weight`, and 1/υ.
+    fn balance(&mut self, per_speed: f64) {
+        let logs = self.weight.iter().map(|w| w.log2()).filter(|log| log.is_finite());
+        let (sum, count) = logs.fold((0.0, 0.0), |(sum, count), log| (sum + log, count + 1.0));
+        let mean = if count > 0.0 { sum / count } else { 0.0 };
+        self.speed.clear();
+        for w in &mut self.weight {
+            let power = (0.5 * (mean - w.log2())).round();
+            let factor = if power.is_finite() { power.clamp(-FACTOR, FACTOR).exp2() } else { 1.0 };
+            self.speed.push(factor * per_speed);
+            *w *= factor * per_speed;
+        }
     }
 
     /// The impulses of the present iterate.
@@ -461,7 +476,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
             }
             let (v, scale) = (&vectors[i], 1.0 / (1.0 + values[i]));
             for k in 0..D {
-                p[i][k] = scale * (v[k] + v[0] * n[k]) * self.inverse_speed;
+                p[i][k] = scale * (v[k] + v[0] * n[k]) * self.speed[c];
                 q[i][k] = scale * values[i] * v[k] * self.weight[c];
             }
         }
@@ -580,7 +595,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         let wdr: [f64; D] = small::block(&self.wdr, c);
         let n = self.whole_slide_direction(c);
         let mut sum: [f64; D] =
-            std::array::from_fn(|k| self.inverse_speed * wdr[k] - weight * self.rho[c][k]);
+            std::array::from_fn(|k| self.speed[c] * wdr[k] - weight * self.rho[c][k]);
         sum[0] += (1..D).map(|k| n[k] * sum[k]).sum::<f64>(); //    dẑ = G (W dr/υ − ρ)
         let pairs = [L::DISKS * c, L::DISKS * c + L::DISKS - 1];
         let dx = pairs.map(|i| self.of_disk(i, &dr.map(|r| self.weight[c] * r)));
@@ -672,7 +687,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
                 }
                 _ => law.shift(&u),
             };
-            let w = self.weight[c] / self.inverse_speed;
+            let w = self.weight[c] / self.speed[c];
             let x = small::block::<D>(&self.r, c).map(|r| w * r);
             errors += law.natural(&x, &modified).iter().map(|v| v * v).sum::<f64>();
         }
@@ -703,7 +718,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
 
     /// ρ of a contact with two cones, `Σ A_k (z_k − s_k e) − u/υ`.
     fn gap_of_two(&self, c: usize, u: &[f64; D]) -> [f64; D] {
-        let mut rho = u.map(|u| -self.inverse_speed * u);
+        let mut rho = u.map(|u| -self.speed[c] * u);
         for k in 0..L::DISKS {
             let i = L::DISKS * c + k;
             let mut z = self.pairs[i].z.vector();
@@ -756,8 +771,9 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
 
     /// The diagonal of Z.
     fn velocity_scale(&self, i: usize) -> [f64; D] {
-        let mut z = self.in_disk(i, self.inverse_speed);
-        z[0] = self.inverse_speed / self.normal(i);
+        let speed = self.speed[i / L::DISKS];
+        let mut z = self.in_disk(i, speed);
+        z[0] = speed / self.normal(i);
         z
     }
 
@@ -783,7 +799,7 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     fn slide(&self, i: usize, size: f64) -> (f64, f64) {
         match self.law {
             _ if self.mu(i) == 0.0 => (0.0, 0.0),
-            Some(Law::Given) => (self.inverse_speed * self.s[i], 0.0),
+            Some(Law::Given) => (self.speed[i / L::DISKS] * self.s[i], 0.0),
             _ if self.delta == 0.0 => (size, self.share),
             _ => {
                 let s = size.hypot(self.delta);
@@ -820,6 +836,9 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         n
     }
 }
+
+/// The largest power of two between the units of two contacts.
+const FACTOR: f64 = 200.0;
 
 /// σ while the equations lag behind complementarity, and where the boundary cuts steps short.
 const BEHIND: f64 = 0.9;

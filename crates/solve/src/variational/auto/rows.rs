@@ -16,7 +16,7 @@ use nonsmooth_problem::field::{Binary, Expressions, Field, Graph, Node};
 use nonsmooth_problem::{Constraints, LcpPoint, Problem, Set, Vi};
 
 use super::Multipliers;
-use crate::core::drive::Meter;
+use crate::core::meter::Meter;
 use crate::core::portfolio::{Candidate, Portfolio};
 use crate::core::settings::SettingsMap;
 use crate::{Limit, Limits, Observer, Outcome, Progress, Sample, Session, SolveError, Status};
