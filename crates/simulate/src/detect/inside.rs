@@ -4,6 +4,8 @@
 //! along the normal of the plane face nearest to its middle, however deep, so that it goes no deeper. The nearest point of the surface tells the side: the mean of the normals there, each by the angle
 //! of its triangle, points outwards from it exactly if it is seen from outside.
 //!
+//! In a valley a body that one side meets may go on behind the other: what of it is lowest along the normals near it is looked for, too, where it is deeper inside than all that was met.
+//!
 //! References: BaerentzenAanaes2005.
 //! Cost: O(log n), a ray through the tree of triangles for a solid that is near none of them, and a descent to the nearest one where that meets something.
 
@@ -15,19 +17,21 @@ use crate::detect::convex::{Meeting, Side, climbed, measured};
 use crate::detect::gjk::closest;
 use crate::detect::segments::Segment;
 use crate::detect::surface::{CONE, NONE, Scratch, Surface, Thin};
-use crate::detect::witness::{Feature, Witness};
+use crate::detect::witness::{Anchor, Feature, Witness};
 use crate::rotation::Pose;
 
 /// Feet nearer to each other than this share of the surface's size are one.
 const SAME: f64 = 1e-9;
+/// The number of a tip of a round solid.
+const TIP: u32 = 1 << 19;
 
 /// The point of a surface that is nearest to a given one.
-struct Foot {
-    far: f64,
-    at: Vec3,
+pub(super) struct Foot {
+    pub far: f64,
+    pub at: Vec3,
     /// The triangle at it whose plane is farthest from the given point, and how far in front of that it is.
-    triangle: u32,
-    height: f64,
+    pub triangle: u32,
+    pub height: f64,
     /// The normals of the triangles at it, each by its angle.
     outwards: Vec3,
     /// Whether it is in the inner of a triangle, and whether at an edge with a triangle on one side only.
@@ -36,7 +40,7 @@ struct Foot {
 }
 
 impl Foot {
-    fn is_below(&self, x: Vec3) -> bool {
+    pub fn is_below(&self, x: Vec3) -> bool {
         match self.within {
             true => self.height < 0.0,
             false => !self.on_border && dot(self.outwards, sub(x, self.at)) < 0.0,
@@ -98,6 +102,67 @@ impl Surface {
         scratch.near = near;
     }
 
+    /// The points of a solid, lowest along the normals of triangles near it, that are deeper inside the surface than `depth`: in a valley what is met at one side may go on behind
+    /// the other. They are met by the plane face nearest to them.
+    pub(super) fn tips(
+        &self,
+        (pose, other): (&Pose, &Side),
+        depth: f64,
+        near: &[u32],
+        found: &mut impl FnMut([Feature; 2], Witness),
+    ) {
+        if matches!(other, Side::Rod { world, .. } if world.is_point()) {
+            return;
+        }
+        let mut last = NONE;
+        for &t in near {
+            if std::mem::replace(&mut last, self.faces[t as usize]) == self.faces[t as usize] {
+                continue;
+            }
+            let n = pose.direction(self.normals[t as usize]);
+            let x = pose.local_point(other.lowest(n));
+            if self.height(t, x) >= -depth {
+                continue;
+            }
+            let Some(foot) = self.foot(x).filter(|f| f.far > depth && f.is_below(x)) else {
+                continue;
+            };
+            let tip = other.support(scale(-1.0, n));
+            let own = match other {
+                Side::Hull { posed, .. } => {
+                    let k = posed.vertices.iter().position(|&v| v == tip).unwrap_or(0);
+                    Feature::Vertex(k as u32)
+                }
+                _ => Feature::Curved(TIP),
+            };
+            let (radius, tip) = (other.radius(), other.pose().local_point(tip));
+            let (face, witness) = self.behind(&foot, x, tip, radius);
+            found([face, own], witness);
+        }
+    }
+
+    /// The contact of a point of another body with the plane face at its foot, or along the way there; x is the point, in the frame of the surface, and `other`, in its own frame, what it is
+    /// the end of by `radius`.
+    pub(super) fn behind(
+        &self,
+        foot: &Foot,
+        x: Vec3,
+        other: Vec3,
+        radius: f64,
+    ) -> (Feature, Witness) {
+        let t = foot.triangle;
+        let (normal, foot) = match foot.height < 0.0 {
+            true => {
+                let n = self.normals[t as usize];
+                (n, sub(x, scale(foot.height, n)))
+            }
+            false => (scale(1.0 / foot.far, sub(foot.at, x)), foot.at),
+        };
+        let anchor = Anchor::Other;
+        let witness = Witness::Face { on_a: true, normal, other, foot, radius, anchor };
+        (self.named(t, Feature::Face(0)), witness)
+    }
+
     /// The point where a solid touches that triangles cut without a normal of the surface: where many thin ones meet, each is separated best along itself. All that are near together
     /// separate along a normal that a climb finds, which begins outwards, a direction in the frame of the body.
     fn cut(
@@ -139,7 +204,7 @@ impl Surface {
     }
 
     /// False where x, in the frame of the body, is not inside: then a ray from there meets nothing. It goes up from below a heightfield, and else to the nearest side of the box about the mesh.
-    fn may_hold(&self, x: Vec3) -> bool {
+    pub(super) fn may_hold(&self, x: Vec3) -> bool {
         let mut ray = [0.0; 3];
         if let Some(below) = self.below {
             ray = scale(-1.0, below);
@@ -163,7 +228,7 @@ impl Surface {
     }
 
     /// The point of the surface that is nearest to x, in the frame of the body.
-    fn foot(&self, x: Vec3) -> Option<Foot> {
+    pub(super) fn foot(&self, x: Vec3) -> Option<Foot> {
         let same = SAME * self.size;
         let mut best: Option<Foot> = None;
         let mut stack = vec![(0.0, 0_u32)];

@@ -11,7 +11,7 @@
 //! | capsule with box, polyhedron; cylinder, cone with all that is convex | [`convex`]: distance, then features |
 //! | elastic box with elastic box | [`facing`]: nodes of the finer mesh at faces of the other |
 //! | mesh, heightfield with all that is convex; mesh with plane | [`surface`]: triangles in a tree of boxes, filtered at inner edges; [`inside`]: what lies behind all of them |
-//! | mesh with mesh, heightfield | [`surfaces`]: pairs of triangles in two trees, filtered at the edges of both |
+//! | mesh with mesh, heightfield | [`surfaces`]: pairs of triangles in two trees, filtered at the edges of both; vertices deep inside the other |
 //! | an image of either in a world that repeats itself | [`images`] finds the pair, then as above |
 //! | polygon with polygon, disc, capsule | [`outline`]: separating sides with hysteresis, sides clipped by sides; nearest side or corner |
 //!
@@ -736,7 +736,7 @@ struct Reach<'a> {
     before: Option<&'a ContactMemory>,
 }
 
-/// Points of a surface and another shape at the same place with the same normal become one, that of the least key.
+/// Points of a surface and another shape at the same place with the same normal become one, that of the least key; of those with one key the deepest is left.
 fn merge(out: &mut Vec<Near>, first: usize) {
     let mut kept = first;
     for k in first..out.len() {
@@ -747,9 +747,16 @@ fn merge(out: &mut Vec<Near>, first: usize) {
                 || (far <= SAME * size
                     && nonsmooth_scenes::vec3::dot(other.place.normal, place.normal) > ALIKE)
         };
-        if !out[first..kept].iter().any(same) {
-            out[kept] = out[k];
-            kept += 1;
+        match out[first..kept].iter().position(same) {
+            None => {
+                out[kept] = out[k];
+                kept += 1;
+            }
+            // Two sides of one feature: the deeper one holds.
+            Some(p) if out[first + p].key == key && place.gap < out[first + p].place.gap => {
+                out[first + p] = out[k];
+            }
+            Some(_) => {}
         }
     }
     out.truncate(kept);

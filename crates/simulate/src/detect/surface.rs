@@ -53,8 +53,12 @@ pub(crate) struct Surface {
     pub(super) edges: Vec<([u32; 2], bool)>,
     /// For each triangle the first of those that make a plane face with it, after which that is named: what moves over the edges between them stays the same contact.
     pub(super) faces: Vec<u32>,
+    /// Whether the solid is reflex at an edge: it lies in a valley.
+    pub(super) valleys: Vec<bool>,
     /// For each vertex the vertices that it has an edge with, and whether all its triangles are coplanar.
-    around: Vec<(Vec<u32>, bool)>,
+    pub(super) around: Vec<(Vec<u32>, bool)>,
+    /// For each vertex whether it is at the end of a valley.
+    pub(super) hollows: Vec<bool>,
     pub(super) tree: Vec<Node>,
     pub(super) order: Vec<u32>,
     pub size: f64,
@@ -88,6 +92,9 @@ pub(crate) struct Scratch {
     /// Where surfaces meet, and pairs of edges, with their gaps, that count where they do not.
     pub(super) met: Vec<Vec3>,
     pub(super) held: Vec<(f64, [Feature; 2], Witness)>,
+    /// What two surfaces met with, and vertices that may be inside the other one.
+    pub(super) said: Vec<Said>,
+    pub(super) vertices: Vec<u32>,
 }
 
 /// Whether the normal is one of the first of two surfaces, the plane face that it is of, and that of the other surface.
@@ -102,6 +109,9 @@ pub(super) struct Hit {
     /// It is at a diagonal of a plane face, where the surfaces have nothing.
     pub flat: bool,
 }
+
+/// The features of two surfaces that met, and where.
+pub(super) type Said = ([Feature; 2], Place);
 
 /// A triangle as a polyhedron without thickness.
 #[derive(Debug, Clone)]
@@ -212,7 +222,9 @@ impl Surface {
             sides,
             edges,
             faces,
+            valleys: vec![],
             around,
+            hollows: vec![],
             tree: vec![],
             order: vec![],
             size,
@@ -220,8 +232,31 @@ impl Surface {
             below: (mesh.is_one_sided() && thickness.is_infinite())
                 .then(|| pose.direction([0.0, 0.0, -1.0])),
         };
+        out.hollow();
         out.grow();
         out
+    }
+
+    /// Notes where the surface is not convex.
+    fn hollow(&mut self) {
+        let is_valley = |e: usize| {
+            let ([t, u], flat) = self.edges[e];
+            let rises = || {
+                let far =
+                    self.triangles[u as usize].map(|v| self.height(t, self.vertices[v as usize]));
+                far.into_iter().fold(0.0, f64::max) > COPLANAR * self.size
+            };
+            self.one_sided && !flat && u != NONE && rises()
+        };
+        self.valleys = (0..self.edges.len()).map(is_valley).collect();
+        let mut hollows = vec![false; self.vertices.len()];
+        for (corners, sides) in self.triangles.iter().zip(&self.sides) {
+            for k in (0..3).filter(|&k| self.valleys[sides[k] as usize]) {
+                hollows[corners[k] as usize] = true;
+                hollows[corners[(k + 1) % 3] as usize] = true;
+            }
+        }
+        self.hollows = hollows;
     }
 
     /// Vertices that are more than points of a plane.
@@ -310,7 +345,7 @@ impl Surface {
     }
 
     /// From edge k of a triangle into it, across the edge, not of unit length.
-    fn inwards(&self, t: u32, e: u32) -> Vec3 {
+    pub(super) fn inwards(&self, t: u32, e: u32) -> Vec3 {
         let sides = self.sides[t as usize];
         let k = sides.iter().position(|&s| s == e).unwrap_or(0);
         let [p, q] = [k, k + 1].map(|i| self.vertices[self.triangles[t as usize][i % 3] as usize]);
@@ -385,10 +420,17 @@ impl Surface {
             let lowest = dot(place.normal, sub(other.lowest(place.normal), surface));
             lowest >= place.gap - SHALLOW * other.size()
         });
-        if self.one_sided && !is_all {
+        if !self.one_sided {
+            return;
+        }
+        let solid = (pose, other, bounds);
+        if !is_all {
             let is_cut = is_near && deepest.is_none_or(|place| place.gap > 0.0);
-            let solid = (pose, other, bounds);
             self.catch(solid, is_cut, prediction, (clip, scratch), &mut found);
+        }
+        if let Some(place) = deepest {
+            let depth = f64::max(0.0, -place.gap) + SHALLOW * other.size();
+            self.tips((pose, other), depth, &scratch.near, &mut found);
         }
     }
 
@@ -469,7 +511,14 @@ impl Surface {
                 } else {
                     met = true;
                     points.push(point);
-                    found([feature, own], witness);
+                    // In a valley both sides are met: each has its name.
+                    let named = match feature {
+                        Feature::Edge(e) if facing && self.valleys[e as usize] => {
+                            self.named(t, Feature::Face(0))
+                        }
+                        _ => feature,
+                    };
+                    found([named, own], witness);
                 }
             }
             let deepest = match (count, across) {

@@ -9,15 +9,18 @@
 //! may all be at the edge of its face, which is flush with one of the other body. Two edges that are near a face so are met all the same, the least deep first, where nothing
 //! else is met within their depth.
 //!
-//! Cost: the pairs of triangles that are near each other, times the logarithm of all.
+//! What is behind a valley is below neither of its sides: the faces beside it are met by all vertices that are nearer to the valley than to what else there is, and edges that end there by what their lines cross
+//! beyond the end before the surface goes on. Vertices deep inside the other surface that nothing says so of are met by the plane face nearest to them.
+//!
+//! Cost: the pairs of triangles that are near each other, times the logarithm of all; a ray and a descent for each vertex in the box about the other surface that has no contact.
 
 use nonsmooth_scenes::vec3::{Vec3, add, cross, dot, norm, scale, sub};
 
 use crate::detect::broad::Aabb;
 use crate::detect::clip::Clip;
 use crate::detect::segments::{Segment, closest};
-use crate::detect::surface::{CONE, DEEP, FACING, Faces, Hit, Scratch, Surface, Thin};
-use crate::detect::witness::{Feature, Witness};
+use crate::detect::surface::{CONE, DEEP, FACING, Faces, Hit, Said, Scratch, Surface, Thin};
+use crate::detect::witness::{Anchor, Feature, Witness};
 use crate::rotation::{Pose, product};
 
 /// Penetrations below this share of the thinner body are not looked at twice.
@@ -47,13 +50,19 @@ pub(crate) fn collide(
 ) {
     let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
     let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
-    let Scratch { thin, other, pairs, stack, hits, dropped, lying, met, held, .. } = scratch;
+    let Scratch { thin, other, pairs, stack, hits, dropped, lying, held, said, vertices, .. } =
+        scratch;
     let thin_body = a.thickness.min(b.thickness);
     let margin = prediction.max(depth.max(SUNK * thin_body).min(DEEP * thin_body));
     near(a, b, &relative, margin, (pairs, stack));
+    let reach = (prediction, margin);
     let mut last = u32::MAX;
-    let at = |witness: &Witness| witness.place(a_pose, b_pose, [0.0, 0.0, 1.0]).point;
-    met.clear();
+    let place = |witness: &Witness| witness.place(a_pose, b_pose, [0.0, 0.0, 1.0]);
+    let mut take = |said: &mut Vec<Said>, features: [Feature; 2], witness: Witness| {
+        said.push((features, place(&witness)));
+        found(features, witness);
+    };
+    said.clear();
     held.clear();
     hits.clear();
     lying.clear();
@@ -66,16 +75,16 @@ pub(crate) fn collide(
         let facing = dot(thin.posed.normals[0], other.posed.normals[0]);
         if facing < CONE {
             let (one, two) = ((a, t, &*thin, a_pose), (b, u, &*other, b_pose));
-            on_face(one, two, true, clip, prediction, hits);
+            on_face(one, two, true, clip, reach, hits);
             // What lies on each other is met with the normal of the first.
             match facing < FACING * FACING - 1.0 {
                 true => lying.push((t, u)),
-                false => on_face(two, one, false, clip, prediction, hits),
+                false => on_face(two, one, false, clip, reach, hits),
             }
         }
         for (e, f) in edges((a, t), (b, u)) {
             let Some(Across { witness, gap, near_a_face }) =
-                across((a, a_pose, e), (b, b_pose, f), prediction, thin_body)
+                across((a, a_pose, e), (b, b_pose, f), reach, thin_body)
             else {
                 continue;
             };
@@ -83,35 +92,126 @@ pub(crate) fn collide(
             if near_a_face {
                 held.push((gap, features, witness));
             } else {
-                met.push(at(&witness));
-                found(features, witness);
+                take(said, features, witness);
             }
         }
     }
     dropped.clear();
     let both = ((a, a_pose), (b, b_pose));
-    let mut take = |features: [Feature; 2], witness: Witness| {
-        met.push(at(&witness));
-        found(features, witness);
-    };
-    settle(hits, both, thin_body, dropped, &mut take);
+    settle(hits, both, thin_body, dropped, &mut |features, witness| take(said, features, witness));
     if !dropped.is_empty() {
         lying.retain(|&(t, u)| dropped.contains(&(true, a.faces[t as usize], b.faces[u as usize])));
         hits.clear();
         for &(t, u) in &*lying {
             a.template(t, a_pose, thin);
             b.template(u, b_pose, other);
-            on_face((b, u, other, b_pose), (a, t, thin, a_pose), false, clip, prediction, hits);
+            on_face((b, u, other, b_pose), (a, t, thin, a_pose), false, clip, reach, hits);
         }
+        let mut take = |features, witness| take(said, features, witness);
         settle(hits, both, thin_body, dropped, &mut take);
     }
     held.sort_unstable_by(|x, y| y.0.total_cmp(&x.0));
     for (gap, features, witness) in held.drain(..) {
-        let here = at(&witness);
-        if met.iter().all(|&there| norm(sub(there, here)) > -gap) {
-            met.push(here);
-            found(features, witness);
+        let here = place(&witness).point;
+        if said.iter().all(|s| norm(sub(s.1.point, here)) > -gap) {
+            take(said, features, witness);
         }
+    }
+    for on_a in [true, false] {
+        sunk(both, (on_a, &relative), thin_body, (said, vertices, stack), &mut take);
+    }
+}
+
+/// Vertices of one surface that are inside the other, and where nothing says so: with the plane face that is nearest to them. `on_a` says whether that is of the first surface; `pose` is that of b in
+/// the frame of a.
+fn sunk(
+    (a, b): (Placed, Placed),
+    (on_a, pose): (bool, &Pose),
+    thickness: f64,
+    (said, vertices, stack): (&mut Vec<Said>, &mut Vec<u32>, &mut Pairs),
+    take: &mut impl FnMut(&mut Vec<Said>, [Feature; 2], Witness),
+) {
+    if thickness.is_infinite() {
+        return;
+    }
+    let ((first, first_pose), (second, second_pose)) = if on_a { (a, b) } else { (b, a) };
+    let shallow = SHALLOW * thickness;
+    let mut bounds = first.tree[0].bounds.grown(-shallow);
+    if let Some(below) = first.below {
+        for (d, down) in scale(first.size, below).into_iter().enumerate() {
+            bounds.low[d] += down.min(0.0);
+            bounds.high[d] += down.max(0.0);
+        }
+    }
+    let there =
+        if on_a { carried(&bounds, &inverse(pose), 0.0) } else { carried(&bounds, pose, 0.0) };
+    vertices.clear();
+    stack.clear();
+    stack.push((0, 0));
+    while let Some((k, _)) = stack.pop() {
+        let node = &second.tree[k as usize];
+        if !node.bounds.meets(&there) {
+            continue;
+        }
+        match node.count {
+            0 => stack.extend([(node.first, 0), (node.first + 1, 0)]),
+            n => {
+                let own = &second.order[node.first as usize..(node.first + n) as usize];
+                vertices.extend(own.iter().flat_map(|&t| second.triangles[t as usize]));
+            }
+        }
+    }
+    vertices.sort_unstable();
+    vertices.dedup();
+    let side = usize::from(on_a);
+    for &v in &*vertices {
+        let feature = Feature::Vertex(v);
+        let local = second.vertices[v as usize];
+        let here = second_pose.point(local);
+        let x = first_pose.local_point(here);
+        if bounds.distance(x) > 0.0
+            || second.is_flat(feature)
+            || said.iter().any(|s| s.0[side] == feature)
+            || !first.may_hold(x)
+        {
+            continue;
+        }
+        let Some(foot) = first.foot(x).filter(|f| f.far > shallow && f.is_below(x)) else {
+            continue;
+        };
+        let (face, witness) = first.behind(&foot, x, local, 0.0);
+        let witness = if on_a { witness } else { witness.swapped() };
+        let (n, far) = (witness.place(a.1, b.1, [0.0, 0.0, 1.0]).normal, foot.far);
+        // Another contact says so where it is nearly as deep beside the vertex; one from which the surface goes on deeper counts where nothing else is near.
+        let towards = second_pose.local_direction(scale(if on_a { -1.0 } else { 1.0 }, n));
+        let is_last = second.is_top(v, towards, STEEP);
+        let says = |(_, place): &Said| {
+            let depth = -place.gap;
+            let reach = if is_last { depth.max(far) } else { DEEP * thickness };
+            depth >= NEARER[0] * far && norm(sub(place.point, here)) <= reach
+        };
+        if said.iter().any(says) {
+            continue;
+        }
+        take(said, if on_a { [face, feature] } else { [feature, face] }, witness);
+    }
+}
+
+/// From the frame of b into that of a, where `pose` is that of a in the frame of b.
+fn inverse(pose: &Pose) -> Pose {
+    let r = std::array::from_fn(|i| std::array::from_fn(|j| pose.r[j][i]));
+    Pose { x: pose.local_point([0.0; 3]), r }
+}
+
+/// The box about a box that has this pose, larger by `margin`.
+fn carried(bounds: &Aabb, pose: &Pose, margin: f64) -> Aabb {
+    let middle = pose.point(std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d])));
+    let half: Vec3 = std::array::from_fn(|d| 0.5 * (bounds.high[d] - bounds.low[d]));
+    let reach: Vec3 =
+        pose.r.map(|row| margin + (0..3).map(|k| row[k].abs() * half[k]).sum::<f64>());
+    Aabb {
+        low: std::array::from_fn(|d| middle[d] - reach[d]),
+        high: std::array::from_fn(|d| middle[d] + reach[d]),
     }
 }
 
@@ -123,16 +223,7 @@ fn near(
     margin: f64,
     (out, stack): (&mut Pairs, &mut Pairs),
 ) {
-    let carried = |bounds: &Aabb| {
-        let middle = pose.point(std::array::from_fn(|d| 0.5 * (bounds.low[d] + bounds.high[d])));
-        let half: Vec3 = std::array::from_fn(|d| 0.5 * (bounds.high[d] - bounds.low[d]));
-        let reach: Vec3 =
-            pose.r.map(|row| margin + (0..3).map(|k| row[k].abs() * half[k]).sum::<f64>());
-        Aabb {
-            low: std::array::from_fn(|d| middle[d] - reach[d]),
-            high: std::array::from_fn(|d| middle[d] + reach[d]),
-        }
-    };
+    let carried = |bounds: &Aabb| carried(bounds, pose, margin);
     out.clear();
     stack.clear();
     stack.push((0, 0));
@@ -171,7 +262,7 @@ fn on_face(
     (b, u, second, b_pose): Triangle,
     on_a: bool,
     clip: &mut Clip,
-    prediction: f64,
+    (prediction, margin): (f64, f64),
     hits: &mut Vec<Hit>,
 ) {
     let faces = (on_a, a.faces[t as usize], b.faces[u as usize]);
@@ -199,6 +290,26 @@ fn on_face(
             hits.push(Hit { faces, features: [f, g], witness, flat: a.is_flat(f) || b.is_flat(g) });
         }
     });
+    // Below a valley is a wedge that is below neither of its sides: what is there is behind both.
+    if !a.is_hollow(t) {
+        return;
+    }
+    for (&v, &here) in b.triangles[u as usize].iter().zip(&second.posed.vertices) {
+        let height = dot(n, here) - first.posed.offsets[0];
+        if !(-margin..0.0).contains(&height) {
+            continue;
+        }
+        let x = a_pose.local_point(here);
+        if a.is_in_wedge(t, x, margin) && (facing || b.is_top(v, against, STEEP)) {
+            let g = Feature::Vertex(v);
+            let (normal, foot) =
+                (a.normals[t as usize], sub(x, scale(height, a.normals[t as usize])));
+            let (other, anchor) = (b.vertices[v as usize], Anchor::Other);
+            let witness = Witness::Face { on_a: true, normal, other, foot, radius: 0.0, anchor };
+            let features = [a.named(t, Feature::Face(0)), g];
+            hits.push(Hit { faces, features, witness, flat: b.is_flat(g) });
+        }
+    }
 }
 
 /// Hands on the points of faces that meet, and notes those of the others.
@@ -271,18 +382,24 @@ struct Across {
 fn across(
     (a, a_pose, e): (&Surface, &Pose, u32),
     (b, b_pose, f): (&Surface, &Pose, u32),
-    prediction: f64,
+    (prediction, margin): (f64, f64),
     thickness: f64,
 ) -> Option<Across> {
     let (s, t) = (a.edge(e), b.edge(f));
     let (p, q) = (s.placed(a_pose), t.placed(b_pose));
     let (x, y) = closest(&p, &q);
     let inside = |x: f64| x > 0.0 && x < 1.0;
-    if !inside(x) || !inside(y) {
+    let cross_within = inside(x) && inside(y);
+    let d = sub(q.at(y), p.at(x));
+    let most = if cross_within { prediction.max(DEEP * thickness) } else { margin };
+    if norm(d) > most {
         return None;
     }
-    let d = sub(q.at(y), p.at(x));
-    if norm(d) > f64::max(prediction, DEEP * thickness) {
+    // Edges that miss each other's ends meet where a valley begins there.
+    let hollow = |s: &Surface, e: u32, x: f64| {
+        inside(x) || s.hollows[s.ends(e)[usize::from(x > 0.5)] as usize]
+    };
+    if !(hollow(a, e, x) && hollow(b, f, y)) {
         return None;
     }
     let product = cross(p.d, q.d);
@@ -296,7 +413,23 @@ fn across(
             && b.has_normal(Feature::Edge(f), b_pose.local_direction(scale(-1.0, n)))
     };
     let sign = [1.0, -1.0].into_iter().find(of_both)?;
-    let gap = dot(scale(sign / length, product), d);
+    let n = scale(sign / length, product);
+    let gap = dot(n, d);
+    if !cross_within {
+        // Where the lines cross, each beyond the end of its edge perhaps.
+        let across = sub(q.p, p.p);
+        let x = dot(cross(across, q.d), product) / (length * length);
+        let y = dot(cross(across, p.d), product) / (length * length);
+        let below = |s: &Surface, pose: &Pose, e: u32, x: f64, there: Vec3, n: Vec3| {
+            inside(x) || s.is_before(e, x > 0.5, pose.local_point(there), pose.local_direction(n))
+        };
+        if gap >= 0.0
+            || !below(a, a_pose, e, x, q.at(y), n)
+            || !below(b, b_pose, f, y, p.at(x), scale(-1.0, n))
+        {
+            return None;
+        }
+    }
     let near_a_face = -gap > SHALLOW * thickness
         && (a.is_within(a_pose.local_point(q.at(y)), -NEARER[1] * gap)
             || b.is_within(b_pose.local_point(p.at(x)), -NEARER[1] * gap));
@@ -305,12 +438,67 @@ fn across(
 }
 
 impl Surface {
-    /// An edge, in the frame of the body.
-    fn edge(&self, e: u32) -> Segment {
+    /// The vertices that an edge goes between.
+    fn ends(&self, e: u32) -> [u32; 2] {
         let t = self.edges[e as usize].0[0] as usize;
         let k = self.sides[t].iter().position(|&s| s == e).unwrap_or(0);
-        let [p, q] = [k, k + 1].map(|i| self.vertices[self.triangles[t][i % 3] as usize]);
+        [k, k + 1].map(|i| self.triangles[t][i % 3])
+    }
+
+    /// An edge, in the frame of the body.
+    fn edge(&self, e: u32) -> Segment {
+        let [p, q] = self.ends(e).map(|v| self.vertices[v as usize]);
         Segment::between(p, q)
+    }
+
+    /// Whether a triangle ends at a valley.
+    fn is_hollow(&self, t: u32) -> bool {
+        self.triangles[t as usize].iter().any(|&v| self.hollows[v as usize])
+    }
+
+    /// Whether x, behind triangle t by at most `margin` and not below it, is nearest to the surface at a valley at its side, or at a corner of it.
+    fn is_in_wedge(&self, t: u32, x: Vec3, margin: f64) -> bool {
+        if self.is_over(t, x) {
+            return false;
+        }
+        let depth = -self.height(t, x);
+        let (k, s, far) = self.on_sides(t, x);
+        if far > margin {
+            return false;
+        }
+        let corner = |k: usize| self.triangles[t as usize][k % 3];
+        let is_nearest_of_it = match s {
+            0.0 | 1.0 => {
+                let v = corner(if s == 0.0 { k } else { k + 1 });
+                let from = sub(x, self.vertices[v as usize]);
+                self.hollows[v as usize] && self.is_top(v, from, CONE * far)
+            }
+            _ => {
+                let e = self.sides[t as usize][k];
+                let from = sub(x, self.vertices[corner(k) as usize]);
+                let beyond = |&u: &u32| {
+                    let inwards = self.inwards(u, e);
+                    dot(inwards, from) <= CONE * norm(inwards) * depth
+                };
+                self.valleys[e as usize] && self.edges[e as usize].0.iter().all(beyond)
+            }
+        };
+        // Far behind it may be something else of the surface.
+        is_nearest_of_it
+            && self.foot(x).is_some_and(|f| f.far >= far * (1.0 - CONE) && f.is_below(x))
+    }
+
+    /// Whether the surface goes on from the end of an edge, its second one perhaps, in front of x, which is beyond that end and behind the edge along n.
+    fn is_before(&self, e: u32, second: bool, x: Vec3, n: Vec3) -> bool {
+        let at = |v: u32| self.vertices[v as usize];
+        let [p, q] = self.ends(e);
+        let (from, end) = if second { (p, q) } else { (q, p) };
+        let along = sub(at(end), at(from));
+        let rises = |&w: &u32| {
+            let d = sub(at(w), at(end));
+            dot(d, n) > 0.0 && dot(d, along) > 0.0 && dot(sub(x, at(end)), d) <= 0.0
+        };
+        self.around[end as usize].0.iter().any(rises)
     }
 
     /// Whether some triangle is nearer to x, in the frame of the body, than `radius`.

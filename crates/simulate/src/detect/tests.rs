@@ -6,6 +6,8 @@ use rand_pcg::Pcg64;
 use super::*;
 use crate::{Body, Part, plane};
 
+mod valleys;
+
 const MARGIN: f64 = 0.05;
 
 /// The contacts of two bodies, the second of which moves freely.

@@ -490,8 +490,8 @@ fn geometry<'a>(node: Node<'a, 'a>, key: &str) -> Result<Value, SimulateError> {
             let file = ["package://", "file://"].iter().find_map(|p| name.strip_prefix(p));
             let mut mesh = json!({"kind": "mesh", "file": file.unwrap_or(name)});
             if let Some([x, y, z]) = triple(shape, "scale", &key)? {
-                if x != y || y != z {
-                    let expected = "the same scale along all axes";
+                if x != y || y != z || x.is_nan() || x <= 0.0 {
+                    let expected = "the same positive scale along all axes";
                     return Err(SimulateError::value(key, expected, format!("{x} {y} {z}")));
                 }
                 mesh["scale"] = json!(x);

@@ -257,7 +257,12 @@ fn what_is_no_robot_is_refused_in_one_line() {
         (
             "<sphere radius=\"0.2\"/>",
             "<mesh filename=\"package://a/b.stl\" scale=\"1 1 2\"/>",
-            "expected the same scale along all axes",
+            "expected the same positive scale along all axes",
+        ),
+        (
+            "<sphere radius=\"0.2\"/>",
+            "<mesh filename=\"a.stl\" scale=\"0 0 0\"/>",
+            "expected the same positive scale along all axes, found 0 0 0",
         ),
         (
             "<mass value=\"1\"/><inertia ixx=\"0.01\" iyy=\"0.01\" izz=\"0.01\"/>",

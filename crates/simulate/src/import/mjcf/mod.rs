@@ -246,7 +246,7 @@ fn remarks(tree: &mut Tree, scene: &Value) {
     let parts = bodies.iter().flat_map(|b| b["shapes"].as_array().into_iter().flatten());
     if parts.into_iter().any(|part| part["shape"]["kind"] == "mesh") {
         tree.said.push(
-            "meshes touch with their surfaces, where MuJoCo takes their convex hulls; of two meshes that may meet the simulation says that it cannot".into(),
+            "meshes touch with their surfaces, where MuJoCo takes their convex hulls; one that is not closed is refused beside another".into(),
         );
     }
 }
