@@ -195,6 +195,10 @@ pub fn compare(old: &Runs, new: &Runs, options: &Options) -> Comparison {
             }
         }
     }
+    for (which, runs) in [("old", old), ("new", new)] {
+        let remarks = runs.unfinished().into_iter().chain(runs.missing_parts());
+        all.warnings.extend(remarks.map(|remark| format!("the {which} campaign: {remark}")));
+    }
     let warning = |(reason, n): (String, usize)| format!("{reason} ({})", plural(n, "pair"));
     all.warnings.extend(reasons.into_iter().map(warning));
     all.slower.sort_by(|a, b| b.ratio.total_cmp(&a.ratio));

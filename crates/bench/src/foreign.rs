@@ -7,6 +7,8 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use nonsmooth_io::FORMATS;
+
 use crate::campaign::{Input, describe, inputs};
 use crate::plural;
 use crate::record::{Campaign, Ending, FORMAT, Machine, Problem, Residuals, Run, VERSION};
@@ -263,11 +265,19 @@ fn json_table(file: &Path, bytes: &[u8]) -> Result<Table, ForeignError> {
     Table { columns, rows }.checked(file)
 }
 
+/// Whether a file is one that [`Imported::text`] makes, and nothing else.
+pub fn is_import(file: &Path) -> bool {
+    Runs::read(file)
+        .is_ok_and(|runs| matches!(runs.campaigns[..], [Campaign { foreign: true, .. }]))
+}
+
 /// A name without folders and without the extensions of problem files: `a/b.hdf5.dat` is `b`.
 fn stem(name: &str) -> &str {
     let mut name = name.rsplit(['/', '\\']).next().unwrap_or(name);
+    let abouts = || FORMATS.iter().map(|f| f.about()).filter(|about| about.holds_problems);
+    let extensions = abouts().flat_map(|about| about.extensions);
     while let Some(shorter) =
-        [".dat", ".hdf5", ".h5", ".toml", ".mtx"].iter().find_map(|e| name.strip_suffix(e))
+        extensions.clone().find_map(|e| name.strip_suffix(e)?.strip_suffix('.'))
     {
         name = shorter;
     }
@@ -288,6 +298,13 @@ struct Reader<'a> {
     unmatched: HashSet<String>,
     ambiguous: HashSet<String>,
     false_claims: usize,
+}
+
+/// How many of the known problems have the name and the size of a row's.
+enum Joined {
+    None,
+    One,
+    Several,
 }
 
 impl<'a> Reader<'a> {
@@ -378,11 +395,10 @@ impl<'a> Reader<'a> {
         let seconds = cells.size("seconds")?;
         let error = cells.size("error")?;
         let contacts = cells.whole("contacts")?;
-        let problem = self.problem(name, contacts.unwrap_or(0) as usize, cells);
+        let (problem, joined) = self.problem(name, contacts.unwrap_or(0) as usize, cells);
         let status = cells.get("status");
         let (ending, message) = ending(status, self.has_error.then_some(error), tolerance);
-        self.false_claims +=
-            usize::from(self.has_error && ending != Ending::Solved && claims(status));
+        let false_claim = self.has_error && ending != Ending::Solved && claims(status);
         let mut residuals = Residuals { reached: error, ..Residuals::default() };
         match self.source.measure {
             None => {}
@@ -418,23 +434,31 @@ impl<'a> Reader<'a> {
                 "expected one row for {name}, {solver} and tolerance {tolerance:e}, found another before"
             ));
         }
+        // What is told counts the rows that are kept.
+        self.false_claims += usize::from(false_claim);
+        match joined {
+            Joined::One => drop(self.matched.insert(problem.name.clone())),
+            Joined::None => drop(self.unmatched.insert(problem.name.clone())),
+            Joined::Several => {
+                self.unmatched.insert(problem.name.clone());
+                self.ambiguous.insert(name.into());
+            }
+        }
         self.runs.problems.entry(problem.name.clone()).or_insert(problem);
         self.runs.runs.push(run);
         Ok(())
     }
 
     /// The known problem of that name and size, else one of our making.
-    fn problem(&mut self, name: &str, contacts: usize, cells: &Cells) -> Problem {
+    fn problem(&self, name: &str, contacts: usize, cells: &Cells) -> (Problem, Joined) {
         let fits = |p: &&&Problem| contacts == 0 || p.contacts == 0 || p.contacts == contacts;
         let namesakes =
             self.known.get(stem(name)).map_or(vec![], |all| all.iter().filter(fits).collect());
-        if let [&only] = namesakes[..] {
-            self.matched.insert(only.name.clone());
-            return only.clone();
-        }
-        if namesakes.len() > 1 {
-            self.ambiguous.insert(name.into());
-        }
+        let joined = match namesakes[..] {
+            [&only] => return (only.clone(), Joined::One),
+            [] => Joined::None,
+            _ => Joined::Several,
+        };
         let family = cells.get("family").unwrap_or(UNMATCHED).to_owned();
         let problem = Problem {
             name: format!("{family}/{}", stem(name)),
@@ -443,8 +467,7 @@ impl<'a> Reader<'a> {
             contacts,
             ..Problem::default()
         };
-        self.unmatched.insert(problem.name.clone());
-        problem
+        (problem, joined)
     }
 
     /// Takes away the iterations of solvers that never report one; returns those solvers.

@@ -106,6 +106,24 @@ impl Selection {
             && one(&self.sizes, &Size::of(run.contacts))
     }
 
+    /// The tightest tolerance that every solver of the runs that it [`takes`](Self::takes) was run at, else the one with
+    /// the most of them; none where it takes none.
+    pub fn common_tolerance(&self, runs: &Runs) -> Option<f64> {
+        runs.common_tolerance(|run| self.takes(run))
+    }
+
+    /// The labels of the solvers that have runs which it takes, refusals aside, and none of them at its tolerance.
+    pub fn without_runs<'a>(&self, runs: &'a Runs) -> Vec<&'a str> {
+        let (mut there, mut at) = (BTreeSet::new(), HashSet::new());
+        for run in runs.runs.iter().filter(|r| self.takes(r) && r.ending != Ending::Refused) {
+            there.insert(run.solver.as_str());
+            if run.tolerance == self.tolerance {
+                at.insert(run.solver.as_str());
+            }
+        }
+        there.into_iter().filter(|solver| !at.contains(solver)).collect()
+    }
+
     /// The runs at its tolerance of the selected [`solvers`](Self::solvers).
     pub(crate) fn taken<'a>(&self, runs: &'a Runs, solvers: &[&str]) -> Vec<&'a Run> {
         let solvers: HashSet<&str> = solvers.iter().copied().collect();

@@ -64,7 +64,7 @@ pub struct Machine {
 /// What a campaign measures, and how. Two campaigns with equal plans can be joined.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Labels of solvers: a name, perhaps with settings, as `nsgs:omega=0.9,local=quartic`.
+    /// Labels of solvers: a name, perhaps with settings, as `nsgs:local=quartic,omega=0.9`.
     pub solvers: Vec<String>,
     /// Relative residuals to reach.
     pub tolerances: Vec<f64>,
@@ -192,6 +192,11 @@ impl Ending {
         Ending::Failed,
     ];
 
+    /// Whether it is an answer: a solution, or a proof that there is none.
+    pub fn answers(self) -> bool {
+        matches!(self, Ending::Solved | Ending::Infeasible)
+    }
+
     /// The name in files, such as `out_of_memory`.
     pub fn name(self) -> &'static str {
         match self {
@@ -315,7 +320,7 @@ pub struct Run {
 impl Run {
     /// Whether it counts as solved: the judge accepts the answer, or the proof that there is none.
     pub fn solved(&self) -> bool {
-        matches!(self.ending, Ending::Solved | Ending::Infeasible)
+        self.ending.answers()
     }
 
     /// The residual down to which it answers the problem: what it reached; 0 for a proof that there is no solution, none

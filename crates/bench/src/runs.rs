@@ -1,8 +1,10 @@
 //! Files of runs: reading them, joining several, and what is wrong with them.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use crate::campaign::{Label, Registry};
+use crate::plural;
 use crate::record::{Campaign, Ending, FORMAT, Line, Plan, Problem, Run, VERSION};
 
 /// Why a file of runs cannot be used. One line each.
@@ -70,7 +72,8 @@ pub struct Runs {
 }
 
 impl Runs {
-    /// Reads a file. A last line that is torn is passed over.
+    /// Reads a file. A last line that is torn is passed over; labels of solvers are in their one spelling
+    /// ([`Label::canonical`]), but for those of foreign programs.
     ///
     /// Errors: a file that cannot be read, that is of another format or version, that has a line that is neither the
     /// last nor of the format, or that holds no campaign.
@@ -98,8 +101,12 @@ impl Runs {
                 Err(e) => return Err(refusal(file, k, line, &e)),
             };
             match parsed {
-                Line::Campaign(campaign) => {
+                Line::Campaign(mut campaign) => {
                     check(file, &campaign)?;
+                    let own = campaign.plan.as_mut().filter(|_| !campaign.foreign);
+                    own.into_iter()
+                        .flat_map(|plan| &mut plan.solvers)
+                        .for_each(|label| *label = Label::canonical(label));
                     all.campaigns.push(campaign);
                 }
                 _ if all.campaigns.is_empty() => {
@@ -114,9 +121,12 @@ impl Runs {
                         return Err(RunsError::Line { file: file.into(), line: k + 1, found });
                     }
                     // No judge has seen a foreign program's proof.
-                    let foreign = || all.campaign(&run).is_some_and(|c| c.foreign);
-                    if run.ending == Ending::Infeasible && foreign() {
+                    let foreign = |run: &Run| all.campaign(run).is_some_and(|c| c.foreign);
+                    if run.ending == Ending::Infeasible && foreign(&run) {
                         run.ending = Ending::NearlyInfeasible;
+                    }
+                    if run.solver.contains(':') && !foreign(&run) {
+                        run.solver = Label::canonical(&run.solver);
                     }
                     if seen.insert(run.key()) {
                         all.runs.push(*run);
@@ -161,12 +171,62 @@ impl Runs {
         joined
     }
 
-    /// What keeps these runs from being one whole campaign: parts that are missing, plans that differ.
-    pub fn remarks(&self) -> Vec<String> {
-        let plans: Vec<&Plan> = self.campaigns.iter().filter_map(|c| c.plan.as_ref()).collect();
+    /// What keeps the runs of a file from being all that were planned: a last line that was torn, runs that were not made.
+    pub fn unfinished(&self) -> Vec<String> {
+        let torn = self.torn.then(|| "the last line is torn, and left out".into());
+        let (missing, planned) = self.missing();
+        let runs = plural(planned, "run");
+        let missing = (missing > 0).then(|| format!("missing {missing} of {runs} of the plan"));
+        torn.into_iter().chain(missing).collect()
+    }
+
+    /// Of the runs that the plans come to, those that are missing, and all.
+    ///
+    /// A problem belongs to the campaigns that have runs on it, one without a run to each. A solver is run on the kinds that
+    /// it takes by the registry, or that it has runs on.
+    fn missing(&self) -> (usize, usize) {
+        let (mut there, mut on, mut takes) = (HashSet::new(), HashSet::new(), HashSet::new());
+        for run in &self.runs {
+            there.insert((run.problem.as_str(), run.solver.as_str(), run.tolerance.to_bits()));
+            on.insert((run.problem.as_str(), Some(run.campaign.as_str())));
+            on.insert((run.problem.as_str(), None));
+            takes.insert((run.solver.as_str(), run.kind.as_str()));
+        }
+        let mut kinds = HashMap::new();
+        let mut planned = HashSet::new();
+        for campaign in &self.campaigns {
+            let Some(plan) = &campaign.plan else { continue };
+            for solver in &plan.solvers {
+                let kinds = kinds.entry(solver.as_str()).or_insert_with(|| {
+                    Label::parse(solver).and_then(|l| l.kinds(&Registry)).unwrap_or_default()
+                });
+                let takes = |kind: &str| {
+                    takes.contains(&(solver, kind)) || kinds.iter().any(|k| k.name() == kind)
+                };
+                let problems = self.problems.values().filter(|p| p.error.is_none());
+                let own = problems.filter(|p| {
+                    let campaign = Some(campaign.id.as_str());
+                    on.contains(&(&p.name, campaign)) || !on.contains(&(&p.name, None))
+                });
+                for problem in own.filter(|p| takes(&p.kind)) {
+                    let name = problem.name.as_str();
+                    let bits = plan.tolerances.iter().map(|t| t.to_bits());
+                    planned.extend(bits.map(|bits| (name, solver.as_str(), bits)));
+                }
+            }
+        }
+        (planned.difference(&there).count(), planned.len())
+    }
+
+    fn plans(&self) -> Vec<&Plan> {
+        self.campaigns.iter().filter_map(|c| c.plan.as_ref()).collect()
+    }
+
+    /// The parts of a campaign of parts that are missing.
+    pub fn missing_parts(&self) -> Vec<String> {
         let mut remarks = vec![];
-        let parts: BTreeSet<(usize, usize)> =
-            plans.iter().filter_map(|p| p.shard).filter(|s| s.1 > 0).map(|(i, n)| (n, i)).collect();
+        let shards = self.plans().into_iter().filter_map(|p| p.shard).filter(|s| s.1 > 0);
+        let parts: BTreeSet<(usize, usize)> = shards.map(|(i, n)| (n, i)).collect();
         let wholes: BTreeSet<usize> = parts.iter().map(|p| p.0).collect();
         for n in wholes {
             let there = parts.range((n, 1)..=(n, n)).count();
@@ -180,7 +240,13 @@ impl Runs {
                 remarks.push(format!("missing parts {}{more}", named.join(", ")));
             }
         }
-        for two in plans.windows(2) {
+        remarks
+    }
+
+    /// What keeps the runs from being measured alike.
+    pub fn differing_plans(&self) -> Vec<String> {
+        let mut remarks = vec![];
+        for two in self.plans().windows(2) {
             let unsharded = |plan: &Plan| Plan { shard: None, ..plan.clone() };
             if let Some(differs) = unsharded(two[0]).difference(&unsharded(two[1])) {
                 remarks.push(format!("plans differ: {differs}"));
@@ -228,14 +294,18 @@ impl Runs {
         all
     }
 
-    /// The tightest tolerance that every solver was run at, else the one with the most runs.
-    pub fn common_tolerance(&self) -> Option<f64> {
-        let solvers = self.solvers().len();
-        let at = |tolerance: f64| self.runs.iter().filter(move |r| r.tolerance == tolerance);
-        let all = |t: &f64| at(*t).map(|r| &r.solver).collect::<HashSet<_>>().len() == solvers;
-        let tolerances = self.tolerances();
-        let common = tolerances.iter().rev().copied().find(all);
-        common.or_else(|| tolerances.into_iter().max_by_key(|t| at(*t).count()))
+    /// Of the runs that are wanted, the tightest tolerance that every solver was run at, else the one with the most runs. Kinds of problem are not
+    /// counted together, and may have tolerances of their own: see [`Selection::common_tolerance`](crate::profile::Selection::common_tolerance).
+    pub(crate) fn common_tolerance(&self, wanted: impl Fn(&Run) -> bool) -> Option<f64> {
+        let runs: Vec<&Run> = self.runs.iter().filter(|r| wanted(r)).collect();
+        let solvers = |runs: &[&Run]| runs.iter().map(|r| &r.solver).collect::<HashSet<_>>().len();
+        let at = |tolerance: f64| -> Vec<&Run> {
+            runs.iter().copied().filter(|r| r.tolerance == tolerance).collect()
+        };
+        let tolerances = self.tolerances_where(&wanted);
+        let all = solvers(&runs);
+        let common = tolerances.iter().rev().copied().find(|t| solvers(&at(*t)) == all);
+        common.or_else(|| tolerances.into_iter().max_by_key(|t| at(*t).len()))
     }
 
     /// The campaign that a run belongs to.

@@ -38,6 +38,7 @@ fn main() {
         a_plan_that_differs_is_refused,
         a_problem_that_changed_is_left_out,
         a_further_folder_changes_no_name_that_is_there,
+        labels_have_one_spelling_in_a_file,
         a_journal_has_one_writer,
         files_of_another_version_are_refused_by_name,
         lines_survive_the_way_to_the_file_and_back,
@@ -292,10 +293,20 @@ fn shards_add_up_to_the_whole() {
     for part in &parts[..2] {
         assert_eq!(joined.join(part.clone()), Joined::default());
     }
-    assert_eq!(joined.remarks(), ["missing parts 2/3"]);
+    assert_eq!(joined.missing_parts(), ["missing parts 2/3"]);
     joined.join(parts[2].clone());
-    assert!(joined.remarks().is_empty(), "{:?}", joined.remarks());
+    assert_eq!((joined.missing_parts(), joined.unfinished()), (vec![], vec![]));
     assert_eq!(keys(&joined), keys(&Runs::read(&file).unwrap()));
+    // What a campaign that was ended has not done, and what the end tore, is told.
+    let text = std::fs::read_to_string(&file).unwrap();
+    let cut = |lines: usize, end: &str| {
+        let kept: String = text.split_inclusive('\n').take(lines).collect();
+        Runs::parse(&file, &(kept + end)).unwrap().unfinished()
+    };
+    assert_eq!(cut(26, ""), [""; 0]);
+    assert_eq!(cut(25, ""), ["missing 1 of 20 runs of the plan"]);
+    let torn = "the last line is torn, and left out";
+    assert_eq!(cut(8, "{\"line\":\"run"), [torn, "missing 18 of 20 runs of the plan"]);
     // All runs of a problem are made by one part.
     let mut makers = BTreeMap::new();
     for run in &joined.runs {
@@ -373,6 +384,28 @@ fn a_further_folder_changes_no_name_that_is_there() {
     let names: Vec<_> = runs.problems.keys().map(String::as_str).collect();
     assert_eq!(names, ["one/p0", "second/one/p0", "two/p1"]);
     assert_eq!(go_on(dir.path(), &file, &plan).unwrap().new, 0);
+    // Nor does a folder less, whose names take in fewer folders.
+    for folder in ["first", "second"] {
+        let summary = go_on(&dir.path().join(folder), &file, &plan).unwrap();
+        assert_eq!((summary.unreadable, summary.new), (0, 0), "{folder}");
+    }
+    assert_eq!(Runs::read(&file).unwrap().problems.len(), 3);
+}
+
+fn labels_have_one_spelling_in_a_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().join("problems");
+    problems(&folder, 1);
+    let file = dir.path().join("runs.jsonl");
+    let (one, another) = ("nsgs:omega=0.9,local=quartic", "nsgs: local=quartic,omega=0.90");
+    assert_eq!(go_on(&folder, &file, &plan(&[one])).unwrap().new, 2);
+    assert_eq!(go_on(&folder, &file, &plan(&[another])).unwrap().new, 0);
+    let label = "nsgs:local=quartic,omega=0.9";
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert_eq!(text.matches(&format!("\"solver\":\"{label}\"")).count(), 2, "{text}");
+    // So are those of older files read.
+    let old = Runs::parse(&file, &text.replace(label, one)).unwrap();
+    assert_eq!((old.solvers(), old.unfinished()), (vec![label], vec![]));
 }
 
 fn a_journal_has_one_writer() {
@@ -465,7 +498,7 @@ fn parts_that_do_not_fit_are_told() {
     let told = joined.join(Runs::read(&files[1]).unwrap());
     assert_eq!((told.twice, told.conflicts), (0, vec!["one/p0".to_owned()]));
     assert_eq!(joined.runs.len(), 4);
-    assert_eq!(joined.remarks(), ["plans differ: a time limit of 0.5, found 0.7"]);
+    assert_eq!(joined.differing_plans(), ["plans differ: a time limit of 0.5, found 0.7"]);
 }
 
 fn a_file_that_changes_or_goes_meanwhile_costs_its_runs_only() {
@@ -523,6 +556,6 @@ fn numbers_that_cannot_be_are_named_by_their_line() {
     // A part of absurdly many is told in one line.
     let mut many = read(&good).unwrap();
     many.campaigns[0].plan.as_mut().unwrap().shard = Some((usize::MAX, usize::MAX));
-    let remarks = many.remarks();
+    let remarks = many.missing_parts();
     assert!(remarks.len() == 1 && remarks[0].ends_with("more"), "{remarks:?}");
 }

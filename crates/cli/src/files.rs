@@ -153,9 +153,9 @@ pub fn time_limit(seconds: Option<f64>) -> Result<Option<f64>, String> {
 pub fn size(text: &str) -> Result<u64, String> {
     let expected = || "expected a size such as 500M or 4G".to_owned();
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
-    let unit = match text[digits.len()..].trim_end_matches(['i', 'B']) {
+    let unit = match text[digits.len()..].to_uppercase().trim_end_matches(['I', 'B']) {
         "" => 1.0,
-        "k" | "K" => 1024.0,
+        "K" => 1024.0,
         "M" => 1024.0 * 1024.0,
         "G" => 1024.0 * 1024.0 * 1024.0,
         "T" => 1024.0 * 1024.0 * 1024.0 * 1024.0,
@@ -383,7 +383,7 @@ pub fn same(a: &Path, b: &Path) -> bool {
     resolved(a).is_some_and(|a| resolved(b) == Some(a))
 }
 
-/// What is written leads to files of their own: to none that is read, and no two options to the same.
+/// What is written leads to files of their own, and so do those that stand there beside it and are written too: to none that is read, and no two options to the same.
 pub fn apart<'a, 'b>(
     read: impl IntoIterator<Item = &'a Path>,
     written: impl IntoIterator<Item = (&'b str, &'b Path)>,
@@ -394,10 +394,18 @@ pub fn apart<'a, 'b>(
         .map(|path| (path, "one that is read".into()))
         .collect();
     for (option, path) in written {
-        let Some(place) = resolved(path) else { continue };
-        if let Some(other) = taken.insert(place, format!("that of {option}")) {
-            let path = path.display();
-            return Err(format!("{option} {path}: expected a file of its own, found {other}"));
+        for part in nonsmooth_io::parts(path) {
+            let Some(place) = resolved(&part) else { continue };
+            if let Some(other) = taken.insert(place, format!("that of {option}")) {
+                let beside = match part == path {
+                    true => String::new(),
+                    false => format!(" for {} beside it", part.display()),
+                };
+                let path = path.display();
+                return Err(format!(
+                    "{option} {path}: expected a file of its own{beside}, found {other}"
+                ));
+            }
         }
     }
     Ok(())

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use nonsmooth_bench::campaign::Label;
 use nonsmooth_io::{About, Format, ProblemFile, StoredPoint, keeper};
+use nonsmooth_problem::check::RELATIVE;
 use nonsmooth_problem::{AnyProblem, Problem, with_problem};
 use nonsmooth_solve::diagnose;
 use nonsmooth_solve::registry;
@@ -30,7 +32,7 @@ use crate::{Exit, answer, enumerate, files, interrupt, output, plot};
 pub struct Args {
     #[arg(required = true, value_name = "FILE", help = files::help("Files with one problem each", |_| true))]
     files: Vec<PathBuf>,
-    /// The solver, one of `nonsmooth list`
+    /// The solver, one of `nonsmooth list`; settings may follow as in a campaign, NAME:KEY=VALUE,...
     #[arg(long, value_name = "NAME", default_value = registry::DEFAULT)]
     solver: String,
     /// A setting of the solver; may be given several times
@@ -139,7 +141,13 @@ pub type Solved = Answer<AnyProblem>;
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
     warm_start_is_meant(args)?;
-    let settings = settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))?;
+    let Label { name: solver, mut settings } = Label::parse(&args.solver)?;
+    for (key, value) in settings::from_texts(&args.settings).map_err(|e| format!("--set: {e}"))? {
+        if settings.contains_key(&key) {
+            return Err(format!("--set: `{key}` is set by --solver {} too", args.solver));
+        }
+        settings.insert(key, value);
+    }
     let mut limits = limits(args.tol, args.max_iter, args.time_limit)?;
     limits.memory_limit = args.memory_limit;
     limits.threads = args.threads;
@@ -150,7 +158,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     }
     let cancel = limits.cancel.clone().unwrap_or_default();
     let plan = Plan {
-        solver: &args.solver,
+        solver: &solver,
         settings: &settings,
         limits,
         begun: Instant::now(),
@@ -173,8 +181,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             return enumerate::run(file, &content, &plan.limits.left(begun), args.json);
         }
         if let Some(number) = args.multistart {
-            let starts =
-                Starts { number, seed: args.seed, solver: &args.solver, settings: &settings };
+            let starts = Starts { number, seed: args.seed, solver: &solver, settings: &settings };
             let limits = plan.limits.left(begun);
             return multistart::run(file, &content, &starts, &limits, args.json);
         }
@@ -584,11 +591,14 @@ fn stuck(history: &[Sample]) -> Option<usize> {
 /// Settings that make another method of the same solver.
 const OTHER_WAYS: [&str; 2] = ["local=projection", "ordering=shuffled"];
 
+/// Criteria that iterations bring down.
+const ITERATED: [&str; 4] = [RELATIVE, "primal", "dual", "bilateral constraints"];
+
 /// What may help where the problem is not solved.
 fn hint(problem: &AnyProblem, solved: &Solved, plan: &Plan, stuck: bool) -> Option<String> {
     // Iterations are of no help where the contacts are as they should be.
     let failing = solved.verdict.measure.failing(plan.limits.tolerance);
-    if !failing.iter().any(|f| ["relative residual", "primal", "dual", "rows"].contains(&f.what)) {
+    if !failing.iter().any(|f| ITERATED.contains(&f.what)) {
         return None;
     }
     let about = kinds::about(problem, plan.solver)?;

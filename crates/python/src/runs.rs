@@ -45,9 +45,9 @@ impl Runs {
         self.0.kinds().into_iter().map(|(kind, n)| (kind.to_owned(), n)).collect()
     }
 
-    /// The tolerance that all solvers were run at, where there is one.
-    fn tolerance(&self) -> Option<f64> {
-        self.0.common_tolerance()
+    /// The tolerance that all solvers were run at on the problems of a kind, else that of most runs; none without runs.
+    fn tolerance(&self, kind: &str) -> Option<f64> {
+        Selection::at(kind, f64::NAN).common_tolerance(&self.0)
     }
 
     /// Performance profiles on the problems of a kind at a tolerance.

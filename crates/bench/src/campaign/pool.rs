@@ -118,8 +118,11 @@ pub fn run(
     cancel: &AtomicBool,
     watch: &mut dyn FnMut(Event<'_>),
 ) -> Result<Summary, String> {
-    let kinds = setup.plan.solvers.iter().map(|label| Label::parse(label)?.kinds(solvers));
-    let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
+    let labels = setup.plan.solvers.iter().map(|label| {
+        let label = Label::parse(label)?;
+        Ok((label.to_string(), label.kinds(solvers)?))
+    });
+    let labels = labels.collect::<Result<Vec<_>, String>>()?;
     let (shard, shards) = setup.plan.shard.unwrap_or((1, 1));
     let inputs: Vec<&Input> = setup.inputs.iter().skip(shard - 1).step_by(shards).collect();
     let lanes = lanes(setup.plan.jobs);
@@ -140,7 +143,7 @@ pub fn run(
         if problem.error.is_some() {
             continue;
         }
-        for (label, kinds, tolerance) in runs_of(&setup.plan, &kinds) {
+        for (label, kinds, tolerance) in runs_of(&setup.plan, &labels) {
             let takes = kinds.iter().any(|kind| kind.name() == problem.kind);
             if !takes && !setup.named {
                 continue;
@@ -196,11 +199,10 @@ pub fn run(
 /// Every solver with the kinds of problem that it takes, at every tolerance.
 fn runs_of<'a>(
     plan: &'a Plan,
-    kinds: &'a [Vec<Kind>],
+    labels: &'a [(String, Vec<Kind>)],
 ) -> impl Iterator<Item = (&'a str, &'a [Kind], f64)> {
     plan.tolerances.iter().flat_map(move |&tolerance| {
-        let solvers = plan.solvers.iter().zip(kinds);
-        solvers.map(move |(label, kinds)| (label.as_str(), kinds.as_slice(), tolerance))
+        labels.iter().map(move |(label, kinds)| (label.as_str(), kinds.as_slice(), tolerance))
     })
 }
 
@@ -219,9 +221,8 @@ fn describe(
     let mut taken = HashSet::new();
     let cancelled = each(setup, lanes, jobs, cancel, &mut |input: &Input, end, _| {
         let mut problem = problem(input, end);
-        if let Some(before) = shorter(&problem, inputs, there)
-            && taken.insert(before)
-        {
+        if let Some(before) = before(&problem, inputs, there, &taken) {
+            taken.insert(before);
             problem.name = before.into();
         }
         match there.problems.get(&problem.name) {
@@ -243,17 +244,25 @@ fn describe(
     Ok((described, cancelled))
 }
 
-/// The name under which a problem is there, where another file of that name has come since, and its own now takes in one more folder.
-fn shorter<'a>(problem: &Problem, inputs: &[&Input], there: &'a Runs) -> Option<&'a str> {
-    if there.problems.contains_key(&problem.name) {
+/// The name under which a problem is there, where that takes in fewer or more folders than its own now: another file of its name has come since, or is not
+/// among the inputs this time.
+fn before<'a>(
+    problem: &Problem,
+    inputs: &[&Input],
+    there: &'a Runs,
+    taken: &HashSet<&str>,
+) -> Option<&'a str> {
+    let is_it = |old: &Problem| old.error.is_none() && old.digest == problem.digest;
+    let named = there.problems.get(&problem.name);
+    if problem.digest.is_empty() || named.is_some_and(|old| old.error.is_some() || is_it(old)) {
         return None;
     }
-    let mut shorter = problem.name.match_indices('/').map(|(at, _)| &problem.name[at + 1..]);
-    let (name, _) = shorter.find_map(|name| {
-        let known = there.problems.get_key_value(name);
-        known.filter(|(_, old)| old.error.is_none() && old.digest == problem.digest)
-    })?;
-    (!inputs.iter().any(|input| input.name == *name)).then_some(name)
+    let ends = |long: &str, short: &str| long.strip_suffix(short).is_some_and(|s| s.ends_with('/'));
+    let known = there.problems.iter().filter(|(_, old)| is_it(old)).map(|(name, _)| name.as_str());
+    let namesakes = known.filter(|name| ends(name, &problem.name) || ends(&problem.name, name));
+    let free = namesakes
+        .filter(|name| !taken.contains(name) && !inputs.iter().any(|input| input.name == **name));
+    free.min_by_key(|name| name.len().abs_diff(problem.name.len()))
 }
 
 impl Setup {

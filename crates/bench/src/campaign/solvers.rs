@@ -1,11 +1,13 @@
 //! Solvers by label, and who makes them.
 
 use std::cmp::Reverse;
+use std::fmt;
 
 use nonsmooth_problem::{Kind, OfAny, each_kind};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::settings::{self, SettingsMap};
 use nonsmooth_solve::{Session, SolveError};
+use serde_json::Value;
 
 /// Who makes solvers: the registry, or a test's own.
 pub trait Solvers: Sync {
@@ -67,7 +69,8 @@ fn rank(kind: Kind) -> (Option<usize>, Reverse<usize>) {
     (first, Reverse(kind.dimension()))
 }
 
-/// A solver as it is asked for: `name` or `name:key=value,key=value`.
+/// A solver as it is asked for: `name` or `name:key=value,key=value`. As a text it has one spelling: without blanks, keys in their
+/// alphabetical order, numbers as short as they are.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
     /// The name in the registry.
@@ -85,6 +88,11 @@ impl Label {
         let each: Vec<&str> = rest.split(',').map(str::trim).filter(|s| !s.is_empty()).collect();
         let settings = settings::from_texts(&each).map_err(|e| format!("solver `{text}`: {e}"))?;
         Ok(Self { name: name.trim().into(), settings })
+    }
+
+    /// The one spelling of a label; a text that is none stays as it is.
+    pub fn canonical(text: &str) -> String {
+        Self::parse(text).map_or_else(|_| text.into(), |label| label.to_string())
     }
 
     /// The kinds of problem that it takes.
@@ -114,6 +122,38 @@ impl Label {
     }
 }
 
+impl fmt::Display for Label {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.name)?;
+        let mut settings: Vec<_> = self.settings.iter().collect();
+        settings.sort_by_key(|&(key, _)| key);
+        for (k, (key, value)) in settings.into_iter().enumerate() {
+            let mark = if k == 0 { ':' } else { ',' };
+            write!(f, "{mark}{key}={}", spelled(value))?;
+        }
+        Ok(())
+    }
+}
+
+/// A value as [`Label::parse`] reads it back.
+fn spelled(value: &Value) -> String {
+    /// Up to here whole numbers are exact.
+    const WHOLE: f64 = 9e15;
+    let back = |text: &str| settings::from_texts(&[format!("key={text}")]);
+    match value {
+        Value::Number(n) if n.is_f64() => match n.as_f64() {
+            Some(x) if x.fract() == 0.0 && x.abs() < WHOLE => (x as i64).to_string(),
+            Some(x) => format!("{x:?}"),
+            None => n.to_string(),
+        },
+        // A text that looks like a number keeps its quotes.
+        Value::String(text) if back(text).is_ok_and(|map| map.get("key") == Some(value)) => {
+            text.clone()
+        }
+        other => other.to_string(),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -131,6 +171,28 @@ mod tests {
         assert!(kinds("nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));
         assert!(kinds("condense/nsgs:omga=1").unwrap_err().contains("unknown key `omga`"));
         assert!(kinds("nsgs:omega").unwrap_err().contains("expected key=value"));
+    }
+
+    #[test]
+    fn a_label_has_one_spelling() {
+        for (text, label) in [
+            ("nsgs", "nsgs"),
+            (" nsgs: ", "nsgs"),
+            ("nsgs:omega=0.9", "nsgs:omega=0.9"),
+            ("nsgs: omega = 0.90", "nsgs:omega=0.9"),
+            ("nsgs:omega=.9,local=\"quartic\"", "nsgs:local=quartic,omega=0.9"),
+            ("nsgs:local=quartic, omega=9e-1", "nsgs:local=quartic,omega=0.9"),
+            ("psor:omega=1.0", "psor:omega=1"),
+            ("a:b=\"1\",c=true,d=1e-10", "a:b=\"1\",c=true,d=1e-10"),
+            ("a:b=1e300,c=-0.0,d=", "a:b=1e300,c=0,d="),
+            ("none: such", "none: such"),
+        ] {
+            assert_eq!(Label::canonical(text), label);
+            assert_eq!(Label::canonical(label), label);
+        }
+        for label in Registry::labels(true, true) {
+            assert_eq!(Label::canonical(&label), label);
+        }
     }
 
     #[test]

@@ -14,6 +14,7 @@ use super::solvers::{Label, Solvers};
 use super::system;
 use crate::finite;
 use crate::record::{Ending, Residuals, Run};
+use crate::tables::median;
 
 /// Seconds between two signs of life.
 const PULSE: f64 = 1.0;
@@ -62,7 +63,8 @@ fn say(said: &Said) {
     }
 }
 
-/// Solves a problem: once to warm up, then `repeats` times (more where it is short), unless the first time is long enough or no success.
+/// Solves a problem: once to warm up, then `repeats` times (more where it is short), unless the first time is long enough or ends without an answer: a solution, or
+/// a proof that there is none.
 fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Result<Said, String> {
     let &Task::Solve { ref solver, tolerance, time_limit, repeats, repeat_below, trace } = task
     else {
@@ -98,9 +100,10 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
         let history = if trace { thinned(session.history()) } else { vec![] };
         Ok((outcome.map_err(|e| e.to_string())?, history))
     };
+    let answers = |(outcome, _): &(Outcome, Trace)| ending(&outcome.status).answers();
     let first = attempt()?;
     let mut timed = vec![first];
-    if timed[0].0.status == Status::Solved && timed[0].0.seconds < repeat_below && repeats > 0 {
+    if answers(&timed[0]) && timed[0].0.seconds < repeat_below && repeats > 0 {
         timed.clear();
         let mut spent = 0.0;
         while timed.len() < repeats as usize
@@ -113,7 +116,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
     timed.sort_by(|a, b| a.0.seconds.total_cmp(&b.0.seconds));
     let seconds: Vec<f64> = timed.iter().map(|t| t.0.seconds).collect();
     // A success that does not repeat is none.
-    let counts = timed.iter().position(|t| t.0.status != Status::Solved).unwrap_or(0);
+    let counts = timed.iter().position(|t| !answers(t)).unwrap_or(0);
     let (outcome, trace) = timed.swap_remove(counts);
     Ok(Said::Done(Box::new(Run {
         ending: ending(&outcome.status),
@@ -121,7 +124,7 @@ fn solve<P: Registered>(problem: &P, task: &Task, solvers: &impl Solvers) -> Res
         iterations: Some(outcome.iterations as u64),
         factorisations: Some(outcome.factorisations),
         seconds: Some(outcome.seconds),
-        seconds_median: Some(seconds[seconds.len() / 2]),
+        seconds_median: median(&seconds),
         seconds_max: Some(seconds[seconds.len() - 1]),
         repeats: seconds.len() as u32,
         cpu_seconds: outcome.cpu_seconds,

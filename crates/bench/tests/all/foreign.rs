@@ -143,6 +143,33 @@ fn without_an_error_the_status_is_believed_and_that_is_said() {
 }
 
 #[test]
+fn rows_that_are_skipped_count_for_nothing() {
+    let row = |problem: &str, iterations: &str| format!("{problem},S,1e-8,1,1e-3,0,{iterations}\n");
+    let rows = [("o", "5"), ("o", "5"), ("a", "x"), ("p", "x"), ("twin", "x")];
+    let rows: String = rows.map(|(problem, iterations)| row(problem, iterations)).concat();
+    let read = read("p.csv", &format!("problem,solver,tol,seconds,error,status,iters\n{rows}"));
+    assert_eq!(read.mistakes.len(), 4, "{:?}", read.mistakes);
+    assert_eq!(
+        read.notes,
+        [
+            "1 of 5 rows read; 0 problems matched, 1 not",
+            "success claimed with an error above the tolerance in 1 row: not solved",
+        ]
+    );
+}
+
+#[test]
+fn files_of_every_format_join_by_name() {
+    let head = "problem,solver,tol,seconds,error\n";
+    for extension in ["dat", "hdf5", "h5", "toml", "mtx", "nl", "nl.dat"] {
+        let read = read("p.csv", &format!("{head}x/a.{extension},S,1e-8,1,1e-9\n"));
+        assert_eq!(read.runs.runs[0].problem, "fc3d/a", "{extension}");
+    }
+    let read = read("p.csv", &format!("{head}a.v2,S,1e-8,1,1e-9\n"));
+    assert_eq!(read.runs.runs[0].problem, "unmatched/a.v2");
+}
+
+#[test]
 fn a_mistake_in_a_row_is_named_and_the_others_are_read() {
     let text = "\
 problem,solver,tol,seconds,error,nc

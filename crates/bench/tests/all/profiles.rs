@@ -539,6 +539,27 @@ fn figures_are_of_the_tolerances_of_their_kind() {
 }
 
 #[test]
+fn a_tolerance_is_common_to_the_runs_of_a_selection() {
+    let mut runs = campaign("a");
+    let at = |tolerance: f64, of: Run| Run { tolerance, ..of };
+    let lcp = |solver: &str| Run { kind: "lcp".into(), ..run("l/p", solver, 1.0) };
+    runs.runs = vec![
+        at(1e-4, run("f/p", "A", 1.0)),
+        run("f/p", "A", 1.0),
+        at(1e-4, run("g/p", "B", 1.0)),
+        at(1e-10, lcp("C")),
+        at(1e-12, lcp("C")),
+    ];
+    let common = |selection: &Selection| selection.common_tolerance(&runs);
+    let all = Selection::at(KIND, 1e-8);
+    assert_eq!((common(&all), common(&Selection::at("lcp", 1.0))), (Some(1e-4), Some(1e-12)));
+    assert_eq!(common(&Selection { solvers: vec!["A".into()], ..all.clone() }), Some(1e-8));
+    assert_eq!(common(&Selection { families: vec!["g".into()], ..all.clone() }), Some(1e-4));
+    assert_eq!(common(&Selection::at("mcp", 1e-8)), None);
+    assert_eq!(all.without_runs(&runs), ["B"]);
+}
+
+#[test]
 fn figures_of_little_or_nothing() {
     let selection = Selection::at(KIND, 1e-8);
     assert_eq!(figures(&campaign("a"), &selection).unwrap(), []);

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
+use nonsmooth_bench::campaign::Label;
 use nonsmooth_bench::figures::figures;
 use nonsmooth_bench::page;
 use nonsmooth_bench::profile::Selection;
@@ -13,6 +14,7 @@ use nonsmooth_bench::tables::{
 };
 
 use super::Joined;
+use crate::report::row;
 use crate::{Exit, files, output};
 
 /// Draw the figures of a campaign for papers, and write its tables.
@@ -30,7 +32,8 @@ pub struct Args {
     /// The folder to write into
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// The tolerance of the profiles and tables; left out: the tightest that every solver was run at
+    /// The tolerance of the profiles and tables; left out: for each kind of problem, the tightest that every solver of
+    /// the runs that are selected was run at
     #[arg(long, value_name = "TOL", allow_hyphen_values = true)]
     tol: Option<f64>,
     /// Only these families
@@ -65,31 +68,49 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     };
     let sizes = args.size.iter().map(size).collect::<Result<Vec<_>, _>>()?;
     let tol = args.tol.map(files::tolerance).transpose()?;
-    let Joined { runs, exit, .. } = super::read(&args.runs)?;
-    let Some(tolerance) = tol.or_else(|| runs.common_tolerance()) else {
+    let Joined { runs, mut remarks, exit, .. } = super::read(&args.runs)?;
+    if runs.runs.is_empty() {
         return Err("expected runs, found none in any file".into());
-    };
+    }
     let kinds: Vec<&str> = runs.kinds().into_iter().map(|(kind, _)| kind).collect();
     known("--kind", &args.kind, kinds.iter().copied())?;
-    known("--solver", &args.solver, runs.runs.iter().map(|run| run.solver.as_str()))?;
+    let solvers = solvers(&runs, &args.solver);
+    known("--solver", &solvers, runs.runs.iter().map(|run| run.solver.as_str()))?;
     known("--family", &args.family, runs.runs.iter().map(|run| run.family.as_str()))?;
-    let of = |kind: &str| Selection {
-        families: args.family.clone(),
-        sizes: sizes.clone(),
-        solvers: args.solver.clone(),
-        ..Selection::at(kind, tolerance)
-    };
     let asked = |kind: &str| args.kind.is_empty() || args.kind.iter().any(|k| k == kind);
-    let chosen = kinds.into_iter().filter(|kind| asked(kind)).map(of).filter(|selection| {
-        runs.runs.iter().any(|r| r.tolerance == tolerance && selection.takes(r))
-    });
-    let chosen: Vec<Selection> = chosen.collect();
+    let mut chosen: Vec<Selection> = vec![];
+    for kind in kinds.into_iter().filter(|kind| asked(kind)) {
+        let mut selection = Selection {
+            families: args.family.clone(),
+            sizes: sizes.clone(),
+            solvers: solvers.clone(),
+            ..Selection::at(kind, tol.unwrap_or_default())
+        };
+        let name = named(kind);
+        let Some(common) = selection.common_tolerance(&runs) else {
+            // The other filters leave nothing of a kind: worth a word where it was asked for.
+            remarks.extend((!args.kind.is_empty()).then(|| format!("{name}: no run is selected")));
+            continue;
+        };
+        selection.tolerance = tol.unwrap_or(common);
+        let at = selection.tolerance;
+        let mut there = runs.runs.iter().filter(|r| r.tolerance == at && selection.takes(r));
+        if there.next().is_none() {
+            remarks.push(format!("{name}: no run at {at:e}, left out"));
+            continue;
+        }
+        let without = selection.without_runs(&runs).join(", ");
+        remarks.extend(
+            (!without.is_empty()).then(|| format!("{name}: no run at {at:e} of {without}")),
+        );
+        chosen.push(selection);
+    }
     if chosen.is_empty() {
-        return Err(format!(
-            "expected runs that are selected at tolerance {tolerance:e}, found none"
-        ));
+        let at = tol.map_or_else(String::new, |tol| format!(" at tolerance {tol:e}"));
+        return Err(format!("expected runs that are selected{at}, found none"));
     }
     let mut folders: Vec<PathBuf> = vec![];
+    let mut texts: Vec<(PathBuf, String)> = vec![];
     for selection in &chosen {
         let folder = match chosen.as_slice() {
             [_] => args.out.clone(),
@@ -98,11 +119,40 @@ pub fn run(args: &Args) -> Result<Exit, String> {
                 names.find(|name| !folders.contains(name)).unwrap_or_default()
             }
         };
-        write(&runs, selection, &folder)?;
+        texts.extend(drawn(&runs, selection, &folder)?);
         folders.push(folder);
     }
-    write_text(&args.out, "runs.csv", &tables::runs_table(&runs).csv())?;
+    texts.push((args.out.join("runs.csv"), tables::runs_table(&runs).csv()));
+    let written = texts.iter().map(|(path, _)| ("--out", path.as_path()));
+    files::apart(args.runs.iter().map(PathBuf::as_path), written)?;
+    output::results_are_filed();
+    for folder in &folders {
+        files::folder("--out", folder)?;
+    }
+    for (path, text) in &texts {
+        files::write_text("--out", path, text)?;
+        output::print(&format!("{}\n", path.display()));
+    }
+    let mut text = String::new();
+    if chosen.iter().any(|selection| selection.tolerance != chosen[0].tolerance) {
+        for Selection { kind, tolerance, .. } in &chosen {
+            row(&mut text, "tolerance", format!("{tolerance:e} for {}", named(kind)));
+        }
+    }
+    output::print(&(text + &super::limits(&remarks)));
     Ok(exit)
+}
+
+/// A kind in a sentence. Other programs' kinds may hold anything; a message is one line.
+fn named(kind: &str) -> String {
+    if kind.is_empty() { "an unknown kind".into() } else { kind.replace(char::is_control, " ") }
+}
+
+/// The labels asked for as the runs have them: ours have one spelling, those of foreign programs any.
+fn solvers(runs: &Runs, asked: &[String]) -> Vec<String> {
+    let there = |label: &String| runs.runs.iter().any(|run| run.solver == *label);
+    let label = |text: &String| if there(text) { text.clone() } else { Label::canonical(text) };
+    asked.iter().map(label).collect()
 }
 
 /// Refuses a name that no run has.
@@ -122,26 +172,25 @@ fn known<'a>(
     }
 }
 
-/// Writes the figures and the tables of a selection into a folder.
-fn write(runs: &Runs, selection: &Selection, folder: &Path) -> Result<(), String> {
-    files::folder("--out", folder)?;
+/// The figures and the tables of a selection, by their places in a folder.
+fn drawn(
+    runs: &Runs,
+    selection: &Selection,
+    folder: &Path,
+) -> Result<Vec<(PathBuf, String)>, String> {
+    let mut texts = vec![];
+    let mut add = |name: String, text: String| texts.push((folder.join(name), text));
     for figure in figures(runs, selection)? {
-        write_text(folder, &format!("{}.svg", figure.name), &figure.svg)?;
-        write_text(folder, &format!("{}.csv", figure.name), &figure.csv)?;
+        add(format!("{}.svg", figure.name), figure.svg);
+        add(format!("{}.csv", figure.name), figure.csv);
     }
     for (name, by) in [("all", By::All), ("family", By::Family), ("size", By::Size)] {
         let rows = summary(runs, selection, by);
-        write_text(folder, &format!("summary-{name}.csv"), &summary_table(&rows).csv())?;
-        write_text(folder, &format!("summary-{name}.md"), &summary_page(&rows).markdown())?;
+        add(format!("summary-{name}.csv"), summary_table(&rows).csv());
+        add(format!("summary-{name}.md"), summary_page(&rows).markdown());
     }
     let nobody = unsolved_table(&unsolved(runs, selection));
-    write_text(folder, "unsolved.csv", &nobody.csv())?;
-    write_text(folder, "unsolved.md", &nobody.markdown())
-}
-
-fn write_text(folder: &Path, name: &str, text: &str) -> Result<(), String> {
-    let path = folder.join(name);
-    files::write_text("--out", &path, text)?;
-    output::print(&format!("{}\n", path.display()));
-    Ok(())
+    add("unsolved.csv".into(), nobody.csv());
+    add("unsolved.md".into(), nobody.markdown());
+    Ok(texts)
 }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use nonsmooth_bench::campaign;
 use nonsmooth_bench::foreign::{self, Measure, Source};
 
 use crate::{Exit, files, output};
@@ -24,7 +25,7 @@ pub struct Args {
     /// The machine that it was measured on, in a few words
     #[arg(long, value_name = "TEXT")]
     machine: String,
-    /// The runs file to write
+    /// The runs file to write: a new one, or one that an import wrote before
     #[arg(long, value_name = "RUNS")]
     out: PathBuf,
     /// Join problems by file name with those of a runs file or of a folder
@@ -64,6 +65,10 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     files::writable("--out", &args.out)?;
     super::apart(std::iter::once(&args.file).chain(&args.problems), &args.out)?;
     files::ends_in("--out", &args.out, &["jsonl"])?;
+    // An import can be made again, a campaign cannot.
+    if !foreign::is_import(&args.out) {
+        campaign::unused(&args.out)?;
+    }
     let measure = args.error.map(|e| match e {
         Error::Siconos => Measure::Siconos,
         Error::Literature => Measure::Literature,

@@ -27,7 +27,8 @@ const EXAMPLES: &str = "\
 Examples:
   nonsmooth bench merge part*.jsonl --out runs.jsonl
 
-Exit codes: 0 joined; 1 joined, but parts are missing or plans differ; 2 some file at fault, the others joined.";
+Exit codes: 0 joined; 1 joined, but parts or runs are missing, a line is torn, or plans differ; 2 some file at fault, the
+others joined.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
@@ -35,7 +36,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     files::ends_in("--out", &args.out, &["jsonl"])?;
     files::writable("--out", &args.out)?;
     campaign::unused(&args.out)?;
-    let Joined { runs, twice, mut exit } = super::read(&args.files)?;
+    let Joined { runs, twice, mut remarks, mut exit } = super::read(&args.files)?;
     let mut text = format!(
         "{}: {}, {} of {}\n",
         args.out.display(),
@@ -46,10 +47,9 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if twice > 0 {
         row(&mut text, "twice", format!("{}: the first counts", count(twice, "run")));
     }
-    for remark in runs.remarks() {
-        row(&mut text, "but", remark);
-        exit = exit.max(Exit::NotSolved);
-    }
+    remarks.extend(runs.differing_plans());
+    text += &super::limits(&remarks);
+    exit = exit.max(Exit::solved(remarks.is_empty()));
     files::write_text("--out", &args.out, &runs.text())?;
     output::print(&text);
     Ok(exit)

@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 use nonsmooth_bench::campaign;
 use nonsmooth_bench::runs::Runs;
 
+use crate::report::row;
 use crate::{Exit, files, output};
 
 /// Compare solvers: run campaigns, and make profiles, tables and reports of them.
@@ -69,6 +70,8 @@ struct Joined {
     runs: Runs,
     /// Runs that are in more than one file; the first counts.
     twice: usize,
+    /// What keeps the runs from being all that were planned, a line each.
+    remarks: Vec<String>,
     /// What the mistakes come to.
     exit: Exit,
 }
@@ -82,7 +85,7 @@ fn apart<'a>(read: impl IntoIterator<Item = &'a PathBuf>, out: &Path) -> Result<
 ///
 /// Errors: no file can be used.
 fn read(files: &[PathBuf]) -> Result<Joined, String> {
-    let mut all = Joined { runs: Runs::default(), twice: 0, exit: Exit::Solved };
+    let mut all = Joined { runs: Runs::default(), twice: 0, remarks: vec![], exit: Exit::Solved };
     for file in files {
         let mut mistake = |message: &str| {
             output::error(message);
@@ -91,6 +94,8 @@ fn read(files: &[PathBuf]) -> Result<Joined, String> {
         match Runs::read(file) {
             Err(e) => mistake(&e.to_string()),
             Ok(runs) => {
+                let said = |remark| format!("{}: {remark}", file.display());
+                all.remarks.extend(runs.unfinished().into_iter().map(said));
                 let joined = all.runs.join(runs);
                 all.twice += joined.twice;
                 for name in joined.conflicts {
@@ -105,5 +110,13 @@ fn read(files: &[PathBuf]) -> Result<Joined, String> {
     if all.runs.campaigns.is_empty() {
         return Err("expected a file of runs that can be used, found none".into());
     }
+    all.remarks.extend(all.runs.missing_parts());
     Ok(all)
+}
+
+/// The last lines of a command's word: what limits what it has made.
+fn limits(remarks: &[String]) -> String {
+    let mut text = String::new();
+    remarks.iter().for_each(|remark| row(&mut text, "but", remark));
+    text
 }

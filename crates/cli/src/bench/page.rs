@@ -50,7 +50,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     super::apart(&args.runs, &args.out)?;
     files::writable("--out", &args.out)?;
     files::ends_in("--out", &args.out, &["md"])?;
-    let Joined { runs, mut exit, .. } = super::read(&args.runs)?;
+    let Joined { runs, remarks, mut exit, .. } = super::read(&args.runs)?;
     let described = match args.problems.as_slice() {
         [] => None,
         folders => {
@@ -65,13 +65,21 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let beside = DOCUMENTS.into_iter().all(there);
     let made = page(&runs, described.as_ref(), &name, &args.command, beside)?;
     let folder = args.out.with_file_name(&name);
+    let drawn: Vec<_> = made
+        .figures
+        .iter()
+        .flat_map(|figure| [("svg", &figure.svg, figure), ("csv", &figure.csv, figure)])
+        .map(|(end, text, figure)| (folder.join(format!("{}.{end}", figure.name)), text))
+        .collect();
+    let written = drawn.iter().map(|(path, _)| ("--out", path.as_path()));
+    files::apart(args.runs.iter().map(PathBuf::as_path), written)?;
     files::folder("--out", &folder)?;
-    for figure in &made.figures {
-        files::write_text("--out", &folder.join(format!("{}.svg", figure.name)), &figure.svg)?;
-        files::write_text("--out", &folder.join(format!("{}.csv", figure.name)), &figure.csv)?;
+    for (path, text) in drawn {
+        files::write_text("--out", &path, text)?;
     }
     files::write_text("--out", &args.out, &made.markdown)?;
     let figures = count(made.figures.len(), "figure");
-    output::print(&format!("{}: {figures} in {}\n", args.out.display(), folder.display()));
+    let limits = super::limits(&remarks);
+    output::print(&format!("{}: {figures} in {}\n{limits}", args.out.display(), folder.display()));
     Ok(exit)
 }

@@ -38,7 +38,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     super::apart(&args.files, &args.out)?;
     files::writable("--out", &args.out)?;
     files::ends_in("--out", &args.out, &["html", "htm"])?;
-    let Joined { runs: all, twice, exit } = super::read(&args.files)?;
+    let Joined { runs: all, twice, remarks, exit } = super::read(&args.files)?;
     let options = args.title.clone().map_or_else(Options::default, |title| Options { title });
     let page = html(&all, &options);
     files::write_text("--out", &args.out, &page)?;
@@ -52,6 +52,6 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     if twice > 0 {
         text += &format!(" ({} in several files: the first counts)", count(twice, "run"));
     }
-    output::print(&format!("{text}\n"));
+    output::print(&format!("{text}\n{}", super::limits(&remarks)));
     Ok(exit)
 }

@@ -26,7 +26,7 @@ use crate::{Exit, files, interrupt, output};
 pub struct Args {
     #[arg(required = true, value_name = "FOLDER", help = files::help("Folders with problems, or files; a problem's family is the folder that holds it. Read are", |_| true))]
     problems: Vec<PathBuf>,
-    /// A solver of `nonsmooth list`, perhaps with settings, as auto or nsgs:omega=0.9,local=quartic; may be given
+    /// A solver of `nonsmooth list`, perhaps with settings, as auto or nsgs:local=quartic,omega=0.9; may be given
     /// several times [default: the solvers that take the kind of each problem, without prefixes]
     #[arg(long = "solver", value_name = "NAME[:KEY=VALUE,...]")]
     solvers: Vec<String>,
@@ -161,13 +161,14 @@ fn plan(args: &Args) -> Result<(Plan, Exit), String> {
     };
     let mut exit = Exit::Solved;
     let mut solvers: Vec<String> = vec![];
-    for label in &args.solvers {
-        let label = label.trim();
-        match Label::parse(label).and_then(|l| l.kinds(&Registry)) {
-            Ok(_) if solvers.iter().any(|s| s == label) => {}
-            Ok(_) => solvers.push(label.into()),
+    for text in &args.solvers {
+        let text = text.trim();
+        let label = Label::parse(text).and_then(|l| l.kinds(&Registry).map(|_| l.to_string()));
+        match label {
+            Ok(label) if solvers.contains(&label) => {}
+            Ok(label) => solvers.push(label),
             Err(e) => {
-                output::error(&format!("--solver {label}: {e}"));
+                output::error(&format!("--solver {text}: {e}"));
                 exit = Exit::Mistake;
             }
         }
@@ -390,6 +391,7 @@ mod tests {
     fn sizes_and_parts() {
         assert_eq!(size("500M"), Ok(500 << 20));
         assert_eq!(size("1.5GiB"), Ok(3 << 29));
+        assert_eq!(size("4g"), size("4G"));
         for text in ["", "G", "4X", "-4G", "1M", "nan"] {
             assert!(size(text).is_err(), "{text}");
         }

@@ -74,6 +74,7 @@ pub fn run(file: &Path, folder: &Path) -> Result<Exit, String> {
             ));
         }
     }
+    output::results_are_filed();
     for Planned { made, folder: family, name, form, settings } in &planned {
         let below = folder.join(family);
         files::folder("--out", &below)?;

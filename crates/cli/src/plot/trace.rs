@@ -164,9 +164,9 @@ impl Panel {
             .draw()?;
         for Curve { colour, marks, points, .. } in &self.curves {
             let points: Vec<_> = points.iter().map(|&(x, y)| (x, self.height(y, low))).collect();
-            // Pivots and iterations are counted one by one: a jump is a stage of another method, or rows that are not there.
+            // Pivots and iterations are counted one by one, of a predictor and its corrector twice: a jump is a stage of another method, or rows that are not there.
             let next = |a: &(f64, Option<f64>), b: &(f64, Option<f64>)| {
-                *marks || (b.1.is_some() == a.1.is_some() && b.0 > a.0 && b.0 <= a.0 + 1.0)
+                *marks || (b.1.is_some() == a.1.is_some() && (a.0..=a.0 + 1.0).contains(&b.0))
             };
             for piece in points.chunk_by(next) {
                 let piece: Vec<_> = piece.iter().filter_map(|&(x, y)| Some((x, y?))).collect();

@@ -144,6 +144,11 @@ fn conversion_keeps_what_it_can_and_says_what_is_lost() {
         lost.contains("problem, velocities of the bodies, drawing of the bodies, title"),
         "{text}"
     );
+    // A matrix has a vector beside it.
+    folder.run("gen lcp --set n=3 --out a.mtx").exits(0);
+    folder.run("gen lcp --set n=4 --out a_q.mtx").exits(0);
+    let beside = ["TO a.mtx", "a file of its own for a_q.mtx beside it", "one that is read"];
+    folder.run("convert a_q.mtx a.mtx").refused(&beside);
     folder.run("convert GFC3D_one.dat one.hdf5").exits(0);
     folder.run("solve one.hdf5").exits(0);
     for (arguments, parts) in [

@@ -40,6 +40,20 @@ fn import_names_rows_at_fault_and_reads_the_others() {
 }
 
 #[test]
+fn import_replaces_an_import_and_nothing_else() {
+    let folder = imported();
+    let import = fs::read_to_string(folder.path("t.jsonl")).unwrap();
+    folder.run(IMPORT).exits(0);
+    for other in
+        [import.replace("\"foreign\":true,", ""), format!("{import}{import}"), "text".into()]
+    {
+        fs::write(folder.path("t.jsonl"), &other).unwrap();
+        folder.run(IMPORT).refused(&["t.jsonl: expected a new file, found"]);
+        assert_eq!(fs::read_to_string(folder.path("t.jsonl")).unwrap(), other);
+    }
+}
+
+#[test]
 fn import_joins_problems_of_a_folder() {
     let folder = Folder::new();
     fs::create_dir(folder.path("walls")).unwrap();
@@ -60,6 +74,12 @@ fn figures_and_tables_are_written() {
         .run("bench figures t.jsonl --out out --solver FAST")
         .refused(&["--solver", "found FAST"]);
     assert_eq!(run.stdout, "");
+    // Its own input would be among the tables.
+    fs::create_dir(folder.path("here")).unwrap();
+    fs::copy(folder.path("t.jsonl"), folder.path("here/runs.csv")).unwrap();
+    folder
+        .run("bench figures here/runs.csv --out here")
+        .refused(&["--out here/runs.csv", "one that is read"]);
     let run = folder.run("bench figures t.jsonl --out out").exits(0);
     for file in run.stdout.lines() {
         assert!(fs::metadata(folder.path(file)).unwrap().len() > 0, "{file}");
@@ -81,6 +101,28 @@ fn figures_and_tables_are_written() {
     assert_eq!(read("../both/runs.csv").lines().count(), 9);
     let one = folder.run("bench figures t.jsonl l.jsonl --out one --kind lcp").exits(0);
     assert!(one.stdout.contains("one/profile-seconds.csv"), "{}", one.stdout);
+    // Each has a tolerance of its own, and what has no run at it is named.
+    let tight = fs::read_to_string(folder.path("l.jsonl")).unwrap().replace("1e-8", "1e-10");
+    fs::write(folder.path("l.jsonl"), tight).unwrap();
+    let own = folder.run("bench figures t.jsonl l.jsonl --out own").exits(0);
+    for line in ["  tolerance  1e-8 for an unknown kind\n", "  tolerance  1e-10 for lcp\n"] {
+        assert!(own.stdout.contains(line), "{}", own.stdout);
+    }
+    assert_eq!(read("../own/lcp/profile-seconds.csv"), profile);
+    let one = folder.run("bench figures t.jsonl l.jsonl --out one --kind lcp").exits(0);
+    assert!(!one.stdout.contains("  "), "{}", one.stdout);
+    let some = folder.run("bench figures t.jsonl l.jsonl --out some --tol 1e-10").exits(0);
+    let line = "  but        an unknown kind: no run at 1e-10, left out\n";
+    assert!(some.stdout.ends_with(line), "{}", some.stdout);
+    let text = fs::read_to_string(folder.path("t.jsonl")).unwrap();
+    let slow = text.replace(
+        "\"solver\":\"SLOW (Peer)\",\"tolerance\":1e-8",
+        "\"solver\":\"SLOW (Peer)\",\"tolerance\":1e-4",
+    );
+    fs::write(folder.path("s.jsonl"), slow).unwrap();
+    let some = folder.run("bench figures s.jsonl --out slow --tol 1e-8").exits(0);
+    let line = "  but        an unknown kind: no run at 1e-8 of SLOW (Peer)\n";
+    assert!(some.stdout.ends_with(line), "{}", some.stdout);
     // A file that cannot be read is named; the rest goes on.
     let run = folder.run("bench figures none.jsonl t.jsonl --out out").exits(2);
     assert!(run.stderr.starts_with("error: none.jsonl: ") && run.stdout.contains("runs.csv"));

@@ -117,6 +117,25 @@ fn parts_are_joined_and_reported() {
     let all = folder.run("bench merge 1.jsonl 2.jsonl 3.jsonl --out all.jsonl").exits(0);
     assert!(all.stdout.contains("3 campaigns, 10 runs of 5 problems"), "{}", all.stdout);
     assert_eq!(runs(&folder.path("all.jsonl")).len(), 10);
+    // What is torn or was not run is said wherever the runs are used.
+    let text = std::fs::read_to_string(folder.path("2.jsonl")).unwrap();
+    let last = text.trim_end().rfind('\n').unwrap();
+    std::fs::write(folder.path("cut.jsonl"), &text[..last + 40]).unwrap();
+    let merged = folder.run("bench merge 1.jsonl cut.jsonl 3.jsonl --out cut-all.jsonl").exits(1);
+    let outputs =
+        ["report cut.jsonl --out r.html", "figures cut.jsonl --out f", "page cut.jsonl --out p.md"];
+    let outputs = outputs.map(|made| folder.run(&format!("bench {made}")).exits(0));
+    for run in outputs.iter().chain([&merged]) {
+        let said = [
+            "  but        cut.jsonl: the last line is torn",
+            "cut.jsonl: missing 1 of 4 runs of the plan",
+        ];
+        assert!(said.iter().all(|said| run.stdout.contains(said)), "{}", run.stdout);
+    }
+    assert!(outputs[0].stdout.contains("missing parts 1/3, 3/3"), "{}", outputs[0].stdout);
+    let compared = folder.run("bench compare 2.jsonl cut.jsonl --outcomes").exits(0);
+    let said = "warning: the new campaign: the last line is torn";
+    assert!(compared.stdout.contains(said), "{}", compared.stdout);
     // Neither is a campaign that is there lost.
     let before = std::fs::read(folder.path("2.jsonl")).unwrap();
     folder
@@ -128,6 +147,30 @@ fn parts_are_joined_and_reported() {
     let own = folder.run("bench merge 1.jsonl --out 1.jsonl");
     assert_eq!(own.code, Some(2));
     assert!(own.stderr.contains("expected a file of its own"), "{}", own.stderr);
+}
+
+/// Times of an even number of solves, of a proof, and of one solver under several spellings.
+#[test]
+fn answers_are_repeated_and_counted_under_one_label() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("no.toml"), "kind = \"lcp\"\nq = [-1]\nM = [[-1]]\n").unwrap();
+    folder.run("gen wall --set rows=6 --set columns=5 --out wall.hdf5").exits(0);
+    let options = "--repeats 2 --repeat-below 100 --time-limit 100 --out r.jsonl";
+    folder.run(&format!("bench run no.toml --solver lemke --tol 1e-8 {options}")).exits(0);
+    let proof = lines(&folder.path("r.jsonl")).pop().unwrap();
+    assert_eq!(proof["ending"], "infeasible");
+    assert!(proof["repeats"].as_u64() >= Some(2), "{proof}");
+    std::fs::remove_file(folder.path("r.jsonl")).unwrap();
+    let labels = "--solver condense/nsgs:omega=0.9 --solver condense/nsgs:omega=0.90";
+    folder.run(&format!("bench run wall.hdf5 {labels} --tol 1e-4 {options}")).exits(0);
+    let all = runs(&folder.path("r.jsonl"));
+    assert_eq!(all.len(), 1, "{all:?}");
+    let run = lines(&folder.path("r.jsonl")).pop().unwrap();
+    let [seconds, median, most] =
+        ["seconds", "seconds_median", "seconds_max"].map(|key| run[key].as_f64().unwrap());
+    if run["repeats"] == 2 {
+        assert_eq!(median, 0.5 * (seconds + most), "{run}");
+    }
 }
 
 #[test]

@@ -48,6 +48,12 @@ fn bad_options_of_solve() {
         ("wall.hdf5 --solver nsgs --set local=7", &["local", "exact"]),
         ("wall.hdf5 --set omega=1", &["solver `auto`", "omega", "interior"]),
         ("wall.hdf5 --set omega", &["--set", "key=value"]),
+        ("wall.hdf5 --solver nsgs:omega", &["nsgs:omega", "key=value"]),
+        ("wall.hdf5 --solver nsgs:omega=3", &["solver `nsgs`", "omega", "(0, 2)", "3"]),
+        (
+            "wall.hdf5 --solver nsgs:omega=1 --set omega=1",
+            &["`omega` is set by --solver nsgs:omega=1 too"],
+        ),
         ("wall.hdf5 --set seed=1 --set seed=2", &["seed", "twice"]),
         ("wall.hdf5 --tol -1e-8", &["--tol", "positive", "-1e-8"]),
         ("wall.hdf5 --tol 0", &["--tol", "positive"]),

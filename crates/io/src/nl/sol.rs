@@ -65,6 +65,16 @@ impl Solution<'_> {
     }
 }
 
+/// The form of a solution, which need not be that of its model: a binary one begins with a length below 2²⁴, so with a zero at one end of four bytes.
+fn form(echo: &Echo, bytes: &[u8]) -> Form {
+    match (bytes, echo.form) {
+        ([0, _, _, 0, ..], Form::BigEndian) => Form::BigEndian,
+        ([_, _, _, 0, ..], _) => Form::LittleEndian,
+        ([0, ..], _) => Form::BigEndian,
+        _ => Form::Text,
+    }
+}
+
 /// The values in the solution of a model that says this of itself; `None`: it has none, or answers another model.
 pub(super) fn values(echo: &Echo, bytes: &[u8]) -> Option<Vec<f64>> {
     let fits = |sizes: &[i64]| {
@@ -73,7 +83,7 @@ pub(super) fn values(echo: &Echo, bytes: &[u8]) -> Option<Vec<f64>> {
         (own && sizes[3] == sizes[2]).then(|| usize::try_from(sizes[1]).ok()).flatten()
     };
     let options = echo.options.len();
-    let x: Vec<f64> = match echo.form {
+    let x: Vec<f64> = match form(echo, bytes) {
         Form::Text => {
             let text = std::str::from_utf8(bytes).ok()?;
             let mut lines = text.lines().map(str::trim).skip_while(|line| *line != "Options");

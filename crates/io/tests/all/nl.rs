@@ -696,6 +696,7 @@ fn what_is_written_is_read_as_the_same_function() {
         assert_eq!(values(&read, &x), values(&problem, &x));
     }
     // A solution stands beside the model, in the form of the model.
+    let mut pairs = vec![];
     for form in [None, Some(Form::LittleEndian), Some(Form::BigEndian)] {
         if let Some(form) = form {
             let text = String::from_utf8(Nl.to_bytes(&path, &file).unwrap()).unwrap();
@@ -711,6 +712,15 @@ fn what_is_written_is_read_as_the_same_function() {
             std::fs::write(&other, &bytes[..end]).unwrap();
             let read = ProblemFile::read(&path).unwrap().solution;
             assert!(read.is_none() || read == solved.solution || form.is_none(), "{end}");
+        }
+        pairs.push((std::fs::read(&path).unwrap(), bytes, solved.solution));
+    }
+    // It is read in any other form too.
+    for (model, ..) in &pairs {
+        std::fs::write(&path, model).unwrap();
+        for (_, solution, point) in &pairs {
+            std::fs::write(path.with_extension("sol"), solution).unwrap();
+            assert_eq!(ProblemFile::read(&path).unwrap().solution, *point);
         }
     }
     file.write(&path).unwrap();

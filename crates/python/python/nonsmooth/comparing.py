@@ -81,7 +81,7 @@ class Runs:
         if kind is None or kind not in kinds:
             raise arguments.mistake("kind", f"a kind of the runs ({', '.join(kinds) or 'there are none'})", kind)
         if tol is None:
-            tol = self._native.tolerance()
+            tol = self._native.tolerance(kind)
         if tol is None:
             raise _nonsmooth.Error("tol: expected a tolerance at which there are runs, found none")
         return Profile(dict(self._native.profile(kind, arguments.real("tol", tol), cost)), cost)
