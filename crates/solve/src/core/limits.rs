@@ -11,7 +11,7 @@ use crate::SolveError;
 /// When to stop.
 #[derive(Debug, Clone)]
 pub struct Limits {
-    /// The relative residual (unit-free, see [`Measure`]) to reach. Nominal 1e-3 … 1e-12; below about 1e-14
+    /// The relative residual (unit-free, see [`Measure`](nonsmooth_problem::check::Measure)) to reach. Nominal 1e-3 … 1e-12; below about 1e-14
     /// rounding in the data's products cannot be told from an error.
     pub tolerance: f64,
     /// At most this many steps.
@@ -25,9 +25,9 @@ pub struct Limits {
     pub memory_limit: Option<u64>,
     /// Threads that large factorisations and sweeps over many contacts may use, 0 for one a core. They change the time, not one bit of the result.
     pub threads: usize,
-    /// Whether to keep the method's own record of its iterations ([`Session::trace`]); it grows with their number.
+    /// Whether to keep the method's own record of its iterations ([`Session::trace`](crate::Session::trace)); it grows with their number.
     pub trace: bool,
-    /// Whether to read the processor's clock too ([`Outcome::cpu_seconds`]), which costs two system calls: as much as a small contact problem.
+    /// Whether to read the processor's clock too ([`Outcome::cpu_seconds`](crate::Outcome::cpu_seconds)), which costs two system calls: as much as a small contact problem.
     pub cpu_time: bool,
 }
 

@@ -107,7 +107,7 @@ pub struct Outcome {
     /// Wall clock of the solve: set-up of the workspace, steps and judgements, but no file and no final report. The judge's own preparation is left out, but where on several threads
     /// it runs beside that set-up and is waited for, and in a session of a small problem, where it takes less than a look at the clock would.
     pub seconds: f64,
-    /// Processor time of the whole process meanwhile, all threads, if [`Limits::cpu_time`] asked for it: below `seconds` where the process had to wait.
+    /// Processor time of the whole process meanwhile, all threads, if [`Limits::cpu_time`](crate::Limits::cpu_time) asked for it: below `seconds` where the process had to wait.
     pub cpu_seconds: Option<f64>,
 }
 
