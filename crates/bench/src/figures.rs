@@ -30,6 +30,14 @@ pub struct Figure {
     pub csv: String,
 }
 
+impl Figure {
+    /// The files that it is kept in, by their names.
+    pub fn files(&self) -> [(String, &str); 2] {
+        [("svg", &self.svg), ("csv", &self.csv)]
+            .map(|(end, text)| (format!("{}.{end}", self.name), text.as_str()))
+    }
+}
+
 /// Every figure that the selected runs have data for: performance profiles by time, iterations and factorisations; data
 /// profiles; success against tolerance; residual against time.
 ///

@@ -123,8 +123,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         folders.push(folder);
     }
     texts.push((args.out.join("runs.csv"), tables::runs_table(&runs).csv()));
-    let written = texts.iter().map(|(path, _)| ("--out", path.as_path()));
-    files::apart(args.runs.iter().map(PathBuf::as_path), written)?;
+    super::apart(&args.runs, texts.iter().map(|(path, _)| path.as_path()))?;
     output::results_are_filed();
     for folder in &folders {
         files::folder("--out", folder)?;
@@ -181,8 +180,7 @@ fn drawn(
     let mut texts = vec![];
     let mut add = |name: String, text: String| texts.push((folder.join(name), text));
     for figure in figures(runs, selection)? {
-        add(format!("{}.svg", figure.name), figure.svg);
-        add(format!("{}.csv", figure.name), figure.csv);
+        figure.files().into_iter().for_each(|(name, text)| add(name, text.into()));
     }
     for (name, by) in [("all", By::All), ("family", By::Family), ("size", By::Size)] {
         let rows = summary(runs, selection, by);

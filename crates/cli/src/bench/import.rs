@@ -63,7 +63,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
         }
     }
     files::writable("--out", &args.out)?;
-    super::apart(std::iter::once(&args.file).chain(&args.problems), &args.out)?;
+    super::apart(std::iter::once(&args.file).chain(&args.problems), [args.out.as_path()])?;
     files::ends_in("--out", &args.out, &["jsonl"])?;
     // An import can be made again, a campaign cannot.
     if !foreign::is_import(&args.out) {

@@ -32,7 +32,7 @@ others joined.";
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    super::apart(&args.files, &args.out)?;
+    super::apart(&args.files, [args.out.as_path()])?;
     files::ends_in("--out", &args.out, &["jsonl"])?;
     files::writable("--out", &args.out)?;
     campaign::unused(&args.out)?;

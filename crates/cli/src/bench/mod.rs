@@ -76,9 +76,13 @@ struct Joined {
     exit: Exit,
 }
 
-/// `--out` names a file of its own.
-fn apart<'a>(read: impl IntoIterator<Item = &'a PathBuf>, out: &Path) -> Result<(), String> {
-    files::apart(read.into_iter().map(PathBuf::as_path), [("--out", out)])
+/// What `--out` leads to are files of their own.
+fn apart<'a, 'b>(
+    read: impl IntoIterator<Item = &'a PathBuf>,
+    out: impl IntoIterator<Item = &'b Path>,
+) -> Result<(), String> {
+    let written = out.into_iter().map(|path| ("--out", path));
+    files::apart(read.into_iter().map(PathBuf::as_path), written)
 }
 
 /// Reads files of runs; those that cannot be used are left out with a message.

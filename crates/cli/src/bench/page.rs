@@ -47,7 +47,7 @@ pub fn run(args: &Args) -> Result<Exit, String> {
             "--out {out}: expected a name such as comparison.md, whose figures go into `comparison`, found none to part"
         ));
     }
-    super::apart(&args.runs, &args.out)?;
+    super::apart(&args.runs, [args.out.as_path()])?;
     files::writable("--out", &args.out)?;
     files::ends_in("--out", &args.out, &["md"])?;
     let Joined { runs, remarks, mut exit, .. } = super::read(&args.runs)?;
@@ -65,17 +65,12 @@ pub fn run(args: &Args) -> Result<Exit, String> {
     let beside = DOCUMENTS.into_iter().all(there);
     let made = page(&runs, described.as_ref(), &name, &args.command, beside)?;
     let folder = args.out.with_file_name(&name);
-    let drawn: Vec<_> = made
-        .figures
-        .iter()
-        .flat_map(|figure| [("svg", &figure.svg, figure), ("csv", &figure.csv, figure)])
-        .map(|(end, text, figure)| (folder.join(format!("{}.{end}", figure.name)), text))
-        .collect();
-    let written = drawn.iter().map(|(path, _)| ("--out", path.as_path()));
-    files::apart(args.runs.iter().map(PathBuf::as_path), written)?;
+    let drawn = made.figures.iter().flat_map(|figure| figure.files());
+    let drawn: Vec<_> = drawn.map(|(name, text)| (folder.join(name), text)).collect();
+    super::apart(&args.runs, drawn.iter().map(|(path, _)| path.as_path()))?;
     files::folder("--out", &folder)?;
-    for (path, text) in drawn {
-        files::write_text("--out", &path, text)?;
+    for (path, text) in &drawn {
+        files::write_text("--out", path, text)?;
     }
     files::write_text("--out", &args.out, &made.markdown)?;
     let figures = count(made.figures.len(), "figure");

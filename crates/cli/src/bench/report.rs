@@ -35,7 +35,7 @@ Exit codes: 0 all files are in the report; 2 a file at fault (the report is of t
 
 /// Runs the command.
 pub fn run(args: &Args) -> Result<Exit, String> {
-    super::apart(&args.files, &args.out)?;
+    super::apart(&args.files, [args.out.as_path()])?;
     files::writable("--out", &args.out)?;
     files::ends_in("--out", &args.out, &["html", "htm"])?;
     let Joined { runs: all, twice, remarks, exit } = super::read(&args.files)?;

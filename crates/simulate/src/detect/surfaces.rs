@@ -48,13 +48,11 @@ pub(crate) fn collide(
     (clip, scratch): (&mut Clip, &mut Scratch),
     mut found: impl FnMut([Feature; 2], Witness),
 ) {
-    let back = std::array::from_fn(|i| std::array::from_fn(|j| a_pose.r[j][i]));
-    let relative = Pose { x: a_pose.local_point(b_pose.x), r: product(&back, &b_pose.r) };
     let Scratch { thin, other, pairs, stack, hits, dropped, lying, held, said, vertices, .. } =
         scratch;
     let thin_body = a.thickness.min(b.thickness);
     let margin = prediction.max(depth.max(SUNK * thin_body).min(DEEP * thin_body));
-    near(a, b, &relative, margin, (pairs, stack));
+    near(a, b, &relative(a_pose, b_pose), margin, (pairs, stack));
     let reach = (prediction, margin);
     let mut last = u32::MAX;
     let place = |witness: &Witness| witness.place(a_pose, b_pose, [0.0, 0.0, 1.0]);
@@ -118,15 +116,14 @@ pub(crate) fn collide(
         }
     }
     for on_a in [true, false] {
-        sunk(both, (on_a, &relative), thin_body, (said, vertices, stack), &mut take);
+        sunk(both, on_a, thin_body, (said, vertices, stack), &mut take);
     }
 }
 
-/// Vertices of one surface that are inside the other, and where nothing says so: with the plane face that is nearest to them. `on_a` says whether that is of the first surface; `pose` is that of b in
-/// the frame of a.
+/// Vertices of one surface that are inside the other, and where nothing says so: with the plane face that is nearest to them. `on_a` says whether that is of the first surface.
 fn sunk(
     (a, b): (Placed, Placed),
-    (on_a, pose): (bool, &Pose),
+    on_a: bool,
     thickness: f64,
     (said, vertices, stack): (&mut Vec<Said>, &mut Vec<u32>, &mut Pairs),
     take: &mut impl FnMut(&mut Vec<Said>, [Feature; 2], Witness),
@@ -143,8 +140,7 @@ fn sunk(
             bounds.high[d] += down.max(0.0);
         }
     }
-    let there =
-        if on_a { carried(&bounds, &inverse(pose), 0.0) } else { carried(&bounds, pose, 0.0) };
+    let there = carried(&bounds, &relative(second_pose, first_pose), 0.0);
     vertices.clear();
     stack.clear();
     stack.push((0, 0));
@@ -197,10 +193,10 @@ fn sunk(
     }
 }
 
-/// From the frame of b into that of a, where `pose` is that of a in the frame of b.
-fn inverse(pose: &Pose) -> Pose {
-    let r = std::array::from_fn(|i| std::array::from_fn(|j| pose.r[j][i]));
-    Pose { x: pose.local_point([0.0; 3]), r }
+/// The pose of b in the frame of a.
+fn relative(a: &Pose, b: &Pose) -> Pose {
+    let back = std::array::from_fn(|i| std::array::from_fn(|j| a.r[j][i]));
+    Pose { x: a.local_point(b.x), r: product(&back, &b.r) }
 }
 
 /// The box about a box that has this pose, larger by `margin`.
