@@ -1,7 +1,7 @@
 //! The one door: whatever the kind, and whatever is asked of the solve.
 
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use nonsmooth_linalg::{Bsr, Dense};
@@ -221,5 +221,26 @@ fn a_time_limit_solves_nothing() {
             );
             assert!(!answer.is_solved() || answer.verdict.solved, "{name} to {limit} s");
         }
+    }
+}
+
+/// Each point by which the judge knows the size of F costs three values, and there are four of them.
+#[test]
+fn a_slow_function_is_not_asked_for_long_after_the_end() {
+    for last in (1..60).step_by(3) {
+        let (calls, flag) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(false)));
+        let (count, end) = (calls.clone(), flag.clone());
+        let value = move |x: &[f64], f: &mut [f64]| {
+            let call = count.fetch_add(1, Ordering::Relaxed) + 1;
+            end.store(call >= last, Ordering::Relaxed);
+            f[0] = (x[0] - 1.0).powi(3) + 0.3 * x[0].sin();
+        };
+        let slope = |x: &[f64], j: &mut [f64]| j[0] = 3.0 * (x[0] - 1.0).powi(2) + 0.3 * x[0].cos();
+        let field = Closures::new(Pattern::dense(1), value, slope).unwrap();
+        let problem = Mcp::ncp(field, vec![50.0]).unwrap();
+        let how = Solve::new().solver("semismooth").tolerance(1e-15).cancel(flag);
+        let answer = how.run(&problem).unwrap();
+        let after = calls.load(Ordering::Relaxed).saturating_sub(last);
+        assert!(after <= 10, "{after} after call {last}: {}", answer.status);
     }
 }

@@ -283,7 +283,7 @@ impl Units {
         let mut defined = terms.look(field.pattern(), x, precisely);
         let mut rows = terms.sizes.iter().zip(&self.start);
         if defined && !self.unasked.is_empty() && rows.any(|(d, unit)| *d < VANISHING * unit) {
-            self.ask(field, terms);
+            self.cut_short = !self.ask(field, terms);
             defined = terms.look(field.pattern(), x, precisely);
         }
         let mut rows = terms.sizes.iter().enumerate();
@@ -441,20 +441,29 @@ impl Units {
         !budget::over()
     }
 
-    fn ask(&mut self, field: &dyn Field, terms: &mut Terms) {
-        for points in std::mem::take(&mut self.unasked) {
-            self.ask_at(points, field, terms);
+    /// False where the time is over first: what is unasked then remains so.
+    fn ask(&mut self, field: &dyn Field, terms: &mut Terms) -> bool {
+        while !self.unasked.is_empty() {
+            let points = self.unasked.remove(0);
+            if !self.ask_at(&points, field, terms) {
+                self.unasked.insert(0, points);
+                break;
+            }
         }
         // These are no sizes of the point last looked at any more.
         terms.at.clear();
+        self.unasked.is_empty()
     }
 
-    /// Takes the units at these points, where F is defined at all of them.
-    fn ask_at(&mut self, points: Vec<Vec<f64>>, field: &dyn Field, terms: &mut Terms) {
+    /// Takes the units at these points, where F is defined at all of them. False where the time is over first.
+    fn ask_at(&mut self, points: &[Vec<f64>], field: &dyn Field, terms: &mut Terms) -> bool {
         let mut before: Option<Vec<f64>> = None;
         for point in points {
-            if !tentatively(|| terms.look(field.pattern(), &point, !self.expressions)) {
-                return;
+            if budget::over() {
+                return false;
+            }
+            if !tentatively(|| terms.look(field.pattern(), point, !self.expressions)) {
+                return true;
             }
             if let Some(before) = before.replace(terms.sizes.clone()) {
                 let sizes = terms.sizes.iter_mut().zip(before);
@@ -468,6 +477,7 @@ impl Units {
         for ((unit, there), _) in rows.filter(|(_, own)| **own > 0.0) {
             *unit = lesser(*unit, there);
         }
+        true
     }
 
     /// What neighbours of these sizes hand on to rows that vanish at the start. Those that are large at a start far off alone, or by terms that no variable within its bounds can balance, make
