@@ -3,7 +3,7 @@
 use crate::common::{run, within};
 use nonsmooth_io::fclib;
 use nonsmooth_problem::{Friction, Problem};
-use nonsmooth_scenes::scenes::{Family, State, Wall};
+use nonsmooth_scenes::scenes::{Bridge, Family, State, Wall};
 use nonsmooth_solve::{Limits, Status, registry};
 
 /// The names of the problems among Siconos' that `ip` solves to 1e-12, and how many there are.
@@ -37,6 +37,24 @@ fn the_arc_length_goes_through_shaken_walls() {
     assert_eq!(pursued.status, Status::Solved, "{}", pursued.measure.relative);
     let monotone = solved(&["path=mehrotra", "patience=60"]);
     assert!(monotone.measure.relative > 1e-5, "{}", monotone.measure.relative);
+}
+
+/// From the cones' units the equations lag behind sixtyfold here, and steps of a hundredth lead nowhere.
+#[test]
+fn interior_points_cross_large_mass_ratios() {
+    for seed in [52, 53] {
+        let bridge = Bridge { spans: 2, mass_ratio: 1e6, mu: 0.8, seed, ..Bridge::default() };
+        let problem = bridge.build().unwrap().problem().unwrap();
+        let whole = run(&problem, "auto", &[], &within(1e-8, 60.0)).outcome;
+        assert_eq!(whole.status, Status::Solved, "{seed}: {}", whole.measure.relative);
+        assert!(whole.iterations < 300, "{seed}: {}", whole.iterations);
+        // Nothing slides with the first seed.
+        if seed == 52 {
+            let relaxed = run(&problem, "convex_relaxation", &[], &within(1e-8, 60.0)).outcome;
+            assert_eq!(relaxed.status, Status::Solved, "{}", relaxed.measure.relative);
+            assert!(relaxed.iterations <= 60, "{}", relaxed.iterations);
+        }
+    }
 }
 
 #[test]

@@ -248,7 +248,7 @@ class ConvexRelaxation(Settings):
     patience : int, default 30
         Steps without a smaller residual of the convex problem after which it gives up.
 
-    References: EcksteinBertsekas1992, NesterovTodd1998, Mehrotra1992, Acary2018.
+    References: EcksteinBertsekas1992, NesterovTodd1998, Mehrotra1992, Vandenberghe2010, Acary2018.
     """
 
     def __init__(

@@ -61,6 +61,9 @@ pub trait Session<P: Problem>: Send {
     ///
     /// `watch` is called after every step, but for a large problem with a limit on time or a flag to cancel: then now and then. Errors are the
     /// caller's mistakes only.
+    ///
+    /// `problem` must pass [`Problem::validate`], which a warm session does not ask again at each solve: with fields that were changed to something else (a negative coefficient, a vector that is too
+    /// short) it may panic or answer another problem. [`Solve::again`](crate::Solve::again) asks.
     fn solve(
         &mut self,
         problem: &P,

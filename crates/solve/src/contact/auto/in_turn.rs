@@ -459,7 +459,7 @@ impl<L: DiskLaw<D>, const D: usize> Impulses<L, D> {
         let problem = FrictionGlobal { H: h, w, mu, ..whole.clone() };
         let mut state = problem.state(Access::Newton).ok()?;
         let mut central = Central::default();
-        let now = central.begin_relaxed(&problem, &mut state, None);
+        let now = central.begin_relaxed(&problem, &mut state);
         Some(Self {
             halvings: Halvings::from(now.error),
             iterations: 0,

@@ -15,7 +15,7 @@
 //!    its rescue a few times.
 //! 4. **Interior point** on the exact law ([`Central`]), a starter, from well inside the cones about the impulses so far: some 8 to 20 iterations lead near the solution of a problem
 //!    at rest; where the central path turns back it is left again. Where it failed far off, or little slides, on the convex relaxation (s = 0, `relaxed.rs`), whose path does not: where nothing slides its solution
-//!    obeys the law; where it comes near, stages 8, sweeps with one projection and 9 come next, which find what little slides.
+//!    obeys the law; where it comes near, stages 8, sweeps with one projection and 9 come next, which find what little slides; else once more on the exact law, from where the relaxation's equations first hold.
 //! 5. **Proximal point, semismooth Newton inside** (`proximal_newton.rs`): ε falls as fast as the subproblems are solved
 //!    easily, and rises where they are not. It keeps full accuracy on hyperstatic problems. Steps are whole where W has no spread (walls, columns, arches), else shortened by a line search.
 //! 6. **Sweeps between the proximal steps**, while they help: they move the impulses within the null space of W, which Newton leaves
@@ -243,8 +243,8 @@ enum Stage {
     Sweeps { claims: usize },
     Rest,
     Trial { idle: usize, least: f64, rescues: usize },
-    Interior { halvings: Halvings, short: usize },
-    Relaxed { halvings: Halvings },
+    Interior { halvings: Halvings, short: usize, before: usize },
+    Relaxed { halvings: Halvings, equations: Halvings },
     Newton,
     Between { left: usize },
     Projected { left: usize },

@@ -1,13 +1,14 @@
 //! The convex relaxation where the interior point on the exact law has failed, far from a solution or where little slides: its path turns back where contacts between sliding and sticking are many, the convex one never does. Where nothing slides at the
 //! solution the two have the same; where little slides the relaxation's is near, and alternating directions, sweeps with one projection a contact, both from zero, and motion and impulses in turn come before
-//! Newton's iterations, which do not end there. Pyramids of spheres at rest and hit.
+//! Newton's iterations, which do not end there. Pyramids of spheres at rest and hit. Where it is not, as with large mass ratios, the exact law has a second trial, from a centre of the relaxation's path.
 
 use nonsmooth_problem::check::Kinematic;
 
-use super::starts::{Halvings, INTERIOR, INTERIOR_IDLE, inside, lost, take};
+use super::starts::{Halvings, INTERIOR, INTERIOR_IDLE, begin_interior_kept, lost, take};
 use super::{Auto, Done, HybridWork, Stage};
 use crate::Step;
 use crate::contact::form::{Disked, Linearised, OnContacts};
+use crate::contact::parts::CentralIterate;
 
 /// The interior point has failed above this error.
 const FAILED_ABOVE: f64 = 1e-3;
@@ -17,6 +18,8 @@ const FAILED_FAR_ABOVE: f64 = 0.03;
 const SLIDING: f64 = 0.3;
 /// Little slides where the relaxation comes nearer than this: 3e-3 to 6e-3 in pyramids of spheres with mu = .6, at .4 and where they are shaken .01 and more.
 const NEARLY_RESTS: f64 = 1e-2;
+/// The exact law begins anew, where the relaxation did not come near, at the first of its iterates whose equations hold to this part of complementarity: there its path is.
+const CENTRED: f64 = 0.1;
 /// The relaxation is as good as solved, and its solution slides, where its own error is below this part of that of the law.
 const SLIDES: f64 = 0.1;
 
@@ -46,8 +49,9 @@ impl<const D: usize> OnContacts<Auto, D> {
         if relaxes {
             inner_best.copy_from_slice(r);
             done.relaxed_error = f64::INFINITY;
-            let now = central.begin_relaxed(problem, state, inside::<P::Law, D>(r));
-            *stage = Stage::Relaxed { halvings: Halvings::from(now.error) };
+            let now = central.begin_relaxed(problem, state);
+            let [halvings, equations] = [now.error, now.residual].map(Halvings::from);
+            *stage = Stage::Relaxed { halvings, equations };
         } else {
             self.subproblem_here(problem, point, work);
         }
@@ -73,7 +77,8 @@ impl<const D: usize> OnContacts<Auto, D> {
             inner_best,
             ..
         } = work;
-        let (Some(central), Some(newton), Stage::Relaxed { halvings }) = (central, newton, stage)
+        let (Some(central), Some(newton), Stage::Relaxed { halvings, equations }) =
+            (central, newton, stage)
         else {
             return lost();
         };
@@ -84,10 +89,14 @@ impl<const D: usize> OnContacts<Auto, D> {
             Ok(now) => {
                 let error = newton.look(problem, state, central.r());
                 let solved = now.error < SLIDES * error;
-                let idle = halvings.idle_at(now.error) >= INTERIOR_IDLE;
-                (solved || idle || done.relaxed >= INTERIOR, error)
+                let idle = halvings.idle_at(now.error).min(equations.idle_at(now.residual));
+                (solved || idle >= INTERIOR_IDLE || done.relaxed >= INTERIOR, error)
             }
         };
+        let centred = |now: &CentralIterate| now.residual < CENTRED * now.tau;
+        if !central.has_kept() && central.now().is_some_and(centred) {
+            central.keep();
+        }
         if error < done.relaxed_error {
             done.relaxed_error = error;
             inner_best.copy_from_slice(central.r());
@@ -103,7 +112,9 @@ impl<const D: usize> OnContacts<Auto, D> {
             if nearly_rests(&work.done) {
                 return self.begin_alternating(problem, point, work, error);
             }
-            self.subproblem_here(problem, point, work);
+            if !begin_interior_kept(problem, work) {
+                self.subproblem_here(problem, point, work);
+            }
         }
         Step::Continue { estimate: error }
     }

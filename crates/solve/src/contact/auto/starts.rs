@@ -339,7 +339,7 @@ impl<const D: usize> OnContacts<Auto, D> {
         work: &mut HybridWork<P, D>,
     ) -> Step {
         let HybridWork { central, state, stage, done, tolerance, .. } = work;
-        let (Some(central), Stage::Interior { halvings, short }) = (central, stage) else {
+        let (Some(central), Stage::Interior { halvings, short, before }) = (central, stage) else {
             return lost();
         };
         let (ended, may_wait) = match central.iterate(problem, state) {
@@ -348,10 +348,11 @@ impl<const D: usize> OnContacts<Auto, D> {
                 done.interior += 1;
                 let idle = halvings.idle_at(now.error);
                 *short = if now.alpha < INTERIOR_SHORT.0 { *short + 1 } else { 0 };
+                let iterations = done.interior - *before;
                 let over = now.error <= tolerance.max(INTERIOR_ERROR)
                     || *short >= INTERIOR_SHORT.1
-                    || done.interior >= INTERIOR;
-                let first = idle == done.interior && idle < INTERIOR_FIRST;
+                    || iterations >= INTERIOR;
+                let first = idle == iterations && idle < INTERIOR_FIRST;
                 (over || idle >= INTERIOR_IDLE, first && !over)
             }
         };
@@ -635,10 +636,26 @@ pub(super) fn begin_interior<P: Linearised<D> + Disked<D>, const D: usize>(
     near: Option<&[f64]>,
 ) {
     work.passed_by = None;
-    let HybridWork { central, state, stage, .. } = work;
+    let HybridWork { central, state, stage, done, .. } = work;
     let central = central.get_or_insert_with(interior_point);
     let now = central.begin(problem, state, 0.0, near.and_then(inside::<P::Law, D>));
-    *stage = Stage::Interior { halvings: Halvings::from(now.error), short: 0 };
+    let (halvings, before) = (Halvings::from(now.error), done.interior);
+    *stage = Stage::Interior { halvings, short: 0, before };
+}
+
+/// Begins stage 4 anew at the iterate that the relaxation kept, if it did.
+pub(super) fn begin_interior_kept<P: Linearised<D> + Disked<D>, const D: usize>(
+    problem: &P,
+    work: &mut HybridWork<P, D>,
+) -> bool {
+    let HybridWork { central, state, stage, done, .. } = work;
+    let Some(central) = central.as_mut().filter(|central| central.has_kept()) else {
+        return false;
+    };
+    let now = central.begin_kept(problem, state);
+    let (halvings, before) = (Halvings::from(now.error), done.interior);
+    *stage = Stage::Interior { halvings, short: 0, before };
+    true
 }
 
 /// That of stage 4, without a workspace yet.

@@ -4,11 +4,11 @@
 //! a contact that slides with u_T had to open with `u_N = mu‖u_T‖`. Where nothing slides its solutions are Coulomb's.
 //!
 //! Method: first impulses in K with `W r + q = 0`, a minimum of zero, by alternating directions with a penalty that vanishes (`parts::alternating`), for as long as they promise to end for
-//! less than ten factorisations. Then Mehrotra's predictor–corrector with Nesterov–Todd scaling and an infeasible start, see `parts::central`. It ends
+//! less than ten factorisations. Then Mehrotra's predictor–corrector with Nesterov–Todd scaling, from where the equations and `x + z = 0` hold, moved inside the cones, see `parts::central`. It ends
 //! when the convex problem is solved to rounding; the judge measures the residual of Coulomb's law, so that a problem whose
 //! contacts slide ends as not solved.
 //!
-//! References: Acary, lecture (123)(124) with s = 0; EcksteinBertsekas1992; NesterovTodd1998; Mehrotra1992.
+//! References: Acary, lecture (123)(124) with s = 0; EcksteinBertsekas1992; NesterovTodd1998; Mehrotra1992; Vandenberghe2010.
 //! Cost of a step: one solve and one projection a contact, all with one factorisation; of the interior point one factorisation of `Q + P W`, two solves, two products. Storage: 26 vectors and seven blocks a contact.
 //! Fails: where the relaxation has no solution (r grows without bound).
 
@@ -55,7 +55,13 @@ impl Described for ConvexRelaxation {
         solves: Solves::Relaxation,
         summary: "search for rest and interior point on the convex relaxation (s = 0), which is Coulomb's law only where nothing slides",
         needs: &[],
-        cites: &["EcksteinBertsekas1992", "NesterovTodd1998", "Mehrotra1992", "Acary2018"],
+        cites: &[
+            "EcksteinBertsekas1992",
+            "NesterovTodd1998",
+            "Mehrotra1992",
+            "Vandenberghe2010",
+            "Acary2018",
+        ],
         variants: &[],
         settings: described::<Self>,
     };
@@ -96,7 +102,7 @@ impl<P: Linearised<D> + Frictional<D>, const D: usize> RelaxedWork<P, D> {
 
     fn begin_interior(&mut self, problem: &P) {
         self.stage = Stage::Interior;
-        self.error = self.ip.begin_relaxed(problem, &mut self.state, None).error;
+        self.error = self.ip.begin_relaxed(problem, &mut self.state).error;
         self.since_best = 0;
     }
 }

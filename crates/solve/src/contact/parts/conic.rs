@@ -58,14 +58,13 @@ impl<L: DiskLaw<D>, const D: usize> ConvexIp<D, L> {
         self.core.begin_convex(problem, state, s, start)
     }
 
-    /// Begins the convex relaxation, s = 0; `start` as above.
+    /// Begins the convex relaxation, s = 0, for one factorisation.
     pub fn begin_relaxed<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
-        start: Option<(&[f64], f64)>,
     ) -> Iterate {
-        self.core.begin_relaxed(problem, state, start)
+        self.core.begin_relaxed(problem, state)
     }
 
     /// One iteration. `Err`: the matrix is numerically singular, the iterate has not moved.
