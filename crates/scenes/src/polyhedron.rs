@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::SceneError;
+use crate::error::positive;
 use crate::vec3::{Mat3, Vec3, add, cross, dot, mean, norm, rectangle, scale, sub};
 
 /// A convex polyhedron by its vertices and its faces, each counter-clockwise seen from outside.
@@ -190,6 +191,10 @@ impl Polyhedron {
     ///
     /// Errors: a half side that is not positive.
     pub fn cuboid(half: Vec3) -> Result<Self, SceneError> {
+        // Two negative sides would make the box of their sizes, which nobody has asked for.
+        for (k, &side) in half.iter().enumerate() {
+            positive(&format!("half[{k}]"), side)?;
+        }
         let [a, b, c] = half;
         let base = rectangle([0.0, 0.0, -c], [a, 0.0, 0.0], [0.0, b, 0.0]);
         Self::prism(&base, [0.0, 0.0, 2.0 * c])
@@ -247,6 +252,14 @@ impl Polyhedron {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_box_has_positive_sides() {
+        for half in [[-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0], [0.0, 1.0, 1.0], [f64::NAN, 1.0, 1.0]] {
+            let error = Polyhedron::cuboid(half).unwrap_err().to_string();
+            assert!(error.starts_with("half[0]: expected a positive number"), "{error}");
+        }
+    }
 
     #[test]
     fn a_hull_is_what_its_points_span() {

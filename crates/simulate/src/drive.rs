@@ -52,6 +52,8 @@ pub(crate) trait Driven {
     fn limits(&self) -> &Limits;
     /// How often a step that fails may be cut in two.
     fn halvings(&self) -> u8;
+    /// Whether the state, and what moves it, are such that a step can be tried.
+    fn check(&mut self) -> Result<(), SimulateError>;
     /// A step as it would be.
     fn attempt(&mut self, h: f64) -> Result<StepReport, SimulateError>;
     /// Takes the step tried last.
@@ -63,7 +65,13 @@ pub(crate) trait Driven {
 /// Does one step of length h, in halves where it fails and may be cut.
 pub(crate) fn step<S: Driven>(simulation: &mut S, h: f64) -> Result<StepReport, SimulateError> {
     require(|| "h".into(), h, h > 0.0, "a positive number")?;
+    simulation.check()?;
     advance(simulation, h, 0)
+}
+
+/// Whether the state is that after the step.
+fn is_taken(report: &StepReport) -> bool {
+    report.status != StepStatus::NotFinite && report.status != CANCELLED
 }
 
 fn advance<S: Driven>(s: &mut S, h: f64, level: u8) -> Result<StepReport, SimulateError> {
@@ -72,18 +80,24 @@ fn advance<S: Driven>(s: &mut S, h: f64, level: u8) -> Result<StepReport, Simula
     let cancelled = report.status == CANCELLED;
     if !solved && !cancelled && level < s.halvings() {
         let before = s.state().clone();
-        let first = advance(s, 0.5 * h, level + 1)?;
-        if first.status == StepStatus::NotFinite || first.status == CANCELLED {
-            return Ok(first);
-        }
-        let second = advance(s, 0.5 * h, level + 1)?;
-        if second.status == CANCELLED {
-            *s.state() = before;
-            return Ok(second);
-        }
-        return Ok(joined(first, second));
+        let halves = advance(s, 0.5 * h, level + 1).and_then(|first| match is_taken(&first) {
+            false => Ok(first),
+            true => advance(s, 0.5 * h, level + 1).map(|second| match is_taken(&second) {
+                false => second,
+                true => joined(first, second),
+            }),
+        });
+        return match halves {
+            Ok(report) if is_taken(&report) => Ok(report),
+            // Half an answer is none: the state is that before the step.
+            left => {
+                *s.state() = before;
+                s.discard();
+                left.map(|report| StepReport { t: s.time(), h, ..report })
+            }
+        };
     }
-    if report.status != StepStatus::NotFinite && !cancelled {
+    if is_taken(&report) {
         s.take(&mut report, h)?;
         report.t = s.time();
     } else {
@@ -103,6 +117,7 @@ pub(crate) fn run<S: Driven>(
     require(|| "until".into(), until, until >= 0.0, "a time of at least 0 s")?;
     let counted = h > f64::EPSILON * until.abs();
     require(|| "h".into(), h, counted, "a step that moves the time, above 2.3e-16 of it")?;
+    simulation.check()?;
     let mut run = RunReport { t: simulation.time(), ..RunReport::default() };
     // What is left of the last step up to the rounding of the sum that time is is no step: t/h terms, each rounded by ε t.
     let summed = f64::EPSILON * until.abs() * (until.abs() / h).max(4.0);

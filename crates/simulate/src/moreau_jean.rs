@@ -175,6 +175,11 @@ impl Activation {
         }
     }
 
+    /// What is to be said of it where a law has `e > 0`.
+    pub(crate) fn warning(self, of: &str) -> Option<String> {
+        (self == Self::Gap).then(|| format!("{of}.activation: `gap` spends the approach in the step that closes a gap: what hits something keeps less than e of its speed"))
+    }
+
     pub(crate) fn validate(&self, of: &str) -> Result<(), SimulateError> {
         let Some((gamma, slack)) = self.forecast() else { return Ok(()) };
         let key = |name: &'static str| move || format!("{of}.activation.forecast.{name}");

@@ -323,6 +323,8 @@ pub struct RunReport {
     pub imbalance: f64,
     /// The deepest penetration, m.
     pub penetration: f64,
+    /// The most by which an equation of a joint, or a relation of a Lagrangian system, is violated after a step, in its unit.
+    pub joints: f64,
     /// Steps with [deep](Counts::deep) contacts.
     pub deep: u64,
     /// The time after the first of them, s.
@@ -355,6 +357,7 @@ impl RunReport {
         self.residual = worse(self.residual, step.residual);
         self.imbalance = worse(self.imbalance, step.energy.relative_imbalance());
         self.penetration = worse(self.penetration, step.drift.penetration);
+        self.joints = worse(self.joints, step.drift.joints);
         self.t = step.t;
     }
 }
@@ -369,10 +372,12 @@ impl std::fmt::Display for RunReport {
         }
         write!(
             f,
-            ": {}; residual at most {:.1e}, energy imbalance at most {:.1e}",
+            ": {}; residual at most {:.1e}, energy imbalance at most {:.1e}, penetration at most {:.1e}, relations violated by at most {:.1e}",
             statuses.join(", "),
             self.residual,
-            self.imbalance
+            self.imbalance,
+            self.penetration,
+            self.joints
         )
     }
 }

@@ -14,8 +14,7 @@ use crate::state::{ElasticState, State};
 use crate::step::{Stride, Tools};
 use crate::world::oscillation;
 use crate::{
-    Activation, BodyId, Dimension, JointReport, MoreauJean, Motion, SimulateError, Stabilisation,
-    World,
+    BodyId, Dimension, JointReport, MoreauJean, Motion, SimulateError, Stabilisation, World,
 };
 
 /// Bodies that overlap by more than this share of the smaller one are refused at the start.
@@ -199,9 +198,8 @@ impl Simulation {
             rigid(&world, "the stabilisation projects contacts")?;
         }
         warnings.extend(small(&world));
-        if scheme.activation == Activation::Gap && world.laws().any(|(_, law)| law.e > 0.0) {
-            let said = "integrator.activation: `gap` spends the approach in the step that closes a gap: what hits something keeps less than e of its speed";
-            warnings.push(said.into());
+        if world.laws().any(|(_, law)| law.e > 0.0) {
+            warnings.extend(scheme.activation.warning("integrator"));
         }
         let mut state = State::of(&world);
         for (k, body) in world.bodies.iter().enumerate() {
@@ -423,6 +421,10 @@ impl Driven for Simulation {
 
     fn halvings(&self) -> u8 {
         self.scheme.halvings
+    }
+
+    fn check(&mut self) -> Result<(), SimulateError> {
+        Ok(())
     }
 
     fn attempt(&mut self, h: f64) -> Result<StepReport, SimulateError> {

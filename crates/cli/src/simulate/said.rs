@@ -79,7 +79,11 @@ impl Run<'_> {
             );
             row(&mut text, "joints", says);
         }
-        row(&mut text, "drift", format!("penetration at most {} m", number(report.penetration)));
+        let mut drift = format!("penetration at most {} m", number(report.penetration));
+        if report.joints > 0.0 {
+            drift += &format!(", joints violated by {} at most", number(report.joints));
+        }
+        row(&mut text, "drift", drift);
         let rate = report.steps as f64 / self.seconds.max(1e-9);
         row(&mut text, "time", format!("{}, {rate:.0} steps a second", seconds(self.seconds)));
         if timings {
@@ -155,6 +159,7 @@ impl Run<'_> {
             "residual": report.residual,
             "imbalance": report.imbalance,
             "penetration": report.penetration,
+            "joint_drift": report.joints,
             "deep": report.deep,
             "joint_violation": self.violation(),
             "notes": simulation.warnings(),

@@ -2,6 +2,22 @@
 
 use nonsmooth_linalg::{Dense, budget, power_of_two};
 
+/// Of `f(x + shift δ)`, which of them make 12 δ f'(x), and how.
+const STENCIL: [(f64, f64); 4] = [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)];
+
+/// `∂f/∂t` of f: R → Rᵐ into `out` by the same formula with `δ = 2⁻⁷ span` rounded to a power of two, so that times are exact. The error is `(ωδ)⁴/30` of the rate of what
+/// turns with ω, 1e-10 for ω = 1/span, and some `1e-14 |f| / span` by rounding.
+pub(super) fn rate(t: f64, span: f64, out: &mut [f64], mut f: impl FnMut(f64, &mut [f64])) {
+    let step = power_of_two(span) / 128.0;
+    let mut values = vec![0.0; out.len()];
+    out.fill(0.0);
+    for (shift, weight) in STENCIL {
+        values.fill(0.0);
+        f(t + shift * step, &mut values);
+        out.iter_mut().zip(&values).for_each(|(o, f)| *o += weight * f / (12.0 * step));
+    }
+}
+
 /// `out[i][j] = ∂f_i/∂x_j` of f: Rⁿ → Rᵐ at x, `out` being m × n:
 ///
 /// ```text
@@ -26,7 +42,7 @@ pub(super) fn jacobian(
         }
         let at = x[j];
         let step = power_of_two(at.abs().max(typical)) / 1024.0;
-        for (shift, weight) in [(1.0, 8.0), (-1.0, -8.0), (2.0, -1.0), (-2.0, 1.0)] {
+        for (shift, weight) in STENCIL {
             x[j] = at + shift * step;
             work.fill(0.0);
             f(x, work);

@@ -3,6 +3,8 @@
 use nonsmooth_linalg::Dense;
 
 use super::{Lagrangian, Size, differences};
+use crate::error::require;
+use crate::{Law, SimulateError};
 
 /// All lines of a system at one configuration: D of each contact, then relations, then scalar rows.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -10,6 +12,8 @@ pub(super) struct Gradients {
     contacts: Dense,
     relations: Dense,
     rows: Dense,
+    /// Whether the system gives tangents, which friction needs.
+    tangents: bool,
 }
 
 impl Gradients {
@@ -24,7 +28,8 @@ impl Gradients {
         let Size { dofs: n, contacts, relations, rows } = system.size();
         let typical = system.typical();
         self.contacts.reset(D * contacts, n);
-        if contacts > 0 && !system.directions(t, q, &mut self.contacts) {
+        self.tangents = contacts > 0 && system.directions(t, q, &mut self.contacts);
+        if contacts > 0 && !self.tangents {
             let mut normals = Dense::zeros(contacts, n);
             differences::jacobian(q, typical, work, &mut normals, |q, g| system.gaps(t, q, g));
             self.contacts.reset(D * contacts, n);
@@ -44,6 +49,12 @@ impl Gradients {
             let rows = |q: &[f64], x: &mut [f64]| system.rows(t, q, x);
             differences::jacobian(q, typical, work, &mut self.rows, rows);
         }
+    }
+
+    /// The law of contact c is without friction or has tangents to act along.
+    pub fn admit(&self, c: usize, law: &Law) -> Result<(), SimulateError> {
+        let ok = self.tangents || law.mu == 0.0;
+        require(|| format!("law({c}).mu"), law.mu, ok, "0, since `directions` gives no tangents")
     }
 
     /// Line i of all.

@@ -176,6 +176,9 @@ impl<const D: usize> Lines<D> {
             if law.validate("").is_err() {
                 law.validate(&format!("law({c})"))?;
             }
+            for gradients in [&self.start, &self.now, &self.end] {
+                gradients.admit(c, &law)?;
+            }
             if law.mu_r != 0.0 {
                 let expected = "0 (only bodies of a world have rolling friction)";
                 return Err(SimulateError::value(format!("law({c}).mu_r"), expected, law.mu_r));

@@ -3,6 +3,7 @@
 use nonsmooth_linalg::{Csc, Dense, Matrix, Singular, SquareCholesky, SquareLu};
 
 use super::Lagrangian;
+use crate::SimulateError;
 
 /// A matrix with its factorisation, which is kept while the matrix stays.
 struct Factored<F> {
@@ -46,13 +47,47 @@ fn dense(a: &mut Matrix) -> Option<&mut Dense> {
     }
 }
 
+/// The most that `|M_ij − M_ji|` may be relative to the largest entry of M.
+const ASYMMETRY: f64 = 1e-10;
+
+/// What an M must be and is not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Unfit {
+    /// Positive definite, of finite entries.
+    Singular,
+    /// Symmetric; by how much it is not.
+    Asymmetric(f64),
+}
+
+impl Unfit {
+    /// The same in words, of M at this time.
+    pub fn at(self, t: f64) -> SimulateError {
+        match self {
+            Self::Singular => SimulateError::value(
+                "mass",
+                "a symmetric positive definite matrix",
+                format!("one that is not, at t = {t}"),
+            ),
+            Self::Asymmetric(x) => SimulateError::value(
+                "asymmetry of mass",
+                "0, of a symmetric matrix",
+                format!("{x}, at t = {t}"),
+            ),
+        }
+    }
+}
+
+/// What a constant M̂ is made of: h, θ, whether it is symmetrised, and M, C, K. These share the memory of those of the system, so that they are the same by
+/// address as long as nobody has written to them.
+type Made = (f64, f64, bool, [Csc; 3]);
+
 /// The matrices of an iteration; those of constant systems are sparse.
 pub(super) struct Matrices {
     n: usize,
     mass: Factored<SquareCholesky>,
     hat: Factored<SquareLu>,
-    /// The h and θ that a constant M̂ is made for, and whether it is symmetrised.
-    made_for: Option<(f64, f64, bool)>,
+    /// What a constant M̂ is made of.
+    made: Option<Made>,
     /// M elsewhere, for the kinetic energy.
     other: Dense,
     by_position: Dense,
@@ -71,7 +106,7 @@ impl Matrices {
             n,
             mass: Factored::new(mass, SquareCholesky::factorise),
             hat: Factored::new(hat, SquareLu::factorise),
-            made_for: None,
+            made: None,
             other: Dense::default(),
             by_position: Dense::default(),
             by_velocity: Dense::default(),
@@ -79,22 +114,32 @@ impl Matrices {
         }
     }
 
-    /// M at q, factorised. Errors: not positive definite, or not finite.
+    /// M at q, factorised unless it is that of the last time. Errors: not symmetric, not positive definite, or not finite.
     pub fn mass<L: Lagrangian<D> + ?Sized, const D: usize>(
         &mut self,
         system: &L,
         q: &[f64],
-    ) -> Result<(), Singular> {
-        if let Some(mass) = dense(&mut self.mass.matrix) {
-            mass.reset(self.n, self.n);
-            system.mass(q, mass);
+    ) -> Result<(), Unfit> {
+        match (&mut self.mass.matrix, system.constant()) {
+            (Matrix::Dense(mass), _) => {
+                mass.reset(self.n, self.n);
+                system.mass(q, mass);
+            }
+            (Matrix::Sparse(mass), Some(c)) if mass != c.mass => {
+                mass.clone_from(c.mass);
+                self.mass.of.clear();
+            }
+            _ => {}
         }
-        self.mass.refresh().map(|_| ())
-    }
-
-    /// The largest `|M_ij − M_ji|` relative to the largest entry.
-    pub fn asymmetry(&self) -> f64 {
-        self.mass.matrix.asymmetry().unwrap_or(0.0)
+        if self.mass.refresh().map_err(|_| Unfit::Singular)? {
+            let asymmetry = self.mass.matrix.asymmetry().unwrap_or(0.0);
+            if asymmetry > ASYMMETRY {
+                // Not to be taken for known by the next call.
+                self.mass.of.clear();
+                return Err(Unfit::Asymmetric(asymmetry));
+            }
+        }
+        Ok(())
     }
 
     /// Whether all entries of M are finite.
@@ -117,7 +162,11 @@ impl Matrices {
     ) -> Result<bool, Singular> {
         let ht = h * theta;
         if let Some(c) = system.constant() {
-            if self.made_for != Some((h, theta, symmetric)) {
+            let same = |(a, b, s, [m, d, k]): &Made| {
+                (*a, *b, *s) == (h, theta, symmetric)
+                    && (m, d, k) == (c.mass, c.damping, c.stiffness)
+            };
+            if !self.made.as_ref().is_some_and(same) {
                 let part =
                     |a: &Csc, x: f64| a.triplets().map(move |(i, j, a)| (i, j, x * a)).collect();
                 let parts: [Vec<_>; 3] =
@@ -132,7 +181,8 @@ impl Matrices {
                 };
                 self.hat.matrix = hat.map_err(|_| Singular)?.into();
                 self.hat.of.clear();
-                self.made_for = Some((h, theta, symmetric));
+                let parts = [c.mass, c.damping, c.stiffness].map(Csc::clone);
+                self.made = Some((h, theta, symmetric, parts));
             }
             return self.hat.refresh();
         }

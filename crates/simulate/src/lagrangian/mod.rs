@@ -118,7 +118,7 @@ pub trait Lagrangian<const D: usize> {
     /// How many of what there are; it never changes.
     fn size(&self) -> Size;
 
-    /// Checks the data of the system, once before it moves.
+    /// Checks the data of the system, before it moves and before it goes on after a call of [`system_mut`](LagrangianSimulation::system_mut).
     fn validate(&self) -> Result<(), SimulateError> {
         Ok(())
     }

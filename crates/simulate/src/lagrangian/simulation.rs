@@ -5,10 +5,11 @@ use nonsmooth_solve::Limits;
 use nonsmooth_solve::registry::Registered;
 use nonsmooth_solve::settings::SettingsMap;
 
-use super::gradients::Gradients;
+use super::differences;
+use super::gradients::{Gradients, dot};
 use super::state::{LagrangianContact, LagrangianState, Memory};
-use super::step::{Tools, zero};
-use super::{Lagrangian, LagrangianScheme};
+use super::step::Tools;
+use super::{Lagrangian, LagrangianScheme, RowLaw, Size};
 use crate::SimulateError;
 use crate::drive::{self, Driven, Observer};
 use crate::error::{finite, require};
@@ -64,6 +65,39 @@ pub struct LagrangianSimulation<L: Lagrangian<D>, const D: usize> {
     state: LagrangianState,
     tools: Tools<D>,
     limits: Limits,
+    /// That at the start.
+    size: Size,
+    /// Whether somebody may have written to the system since it was checked.
+    changed: bool,
+    warnings: Vec<String>,
+}
+
+/// How much a velocity may miss a relation by, relative to the terms of its rate, to be called consistent.
+const CONSISTENT: f64 = 1e-9;
+
+/// q and v are n finite numbers each, and constant matrices n × n.
+fn fits<L: Lagrangian<D> + ?Sized, const D: usize>(
+    system: &L,
+    q: &[f64],
+    v: &[f64],
+) -> Result<(), SimulateError> {
+    let n = system.size().dofs;
+    for (name, x) in [("q", q), ("v", v)] {
+        if x.len() != n {
+            let expected = format!("{n} entries, one for each degree of freedom");
+            return Err(SimulateError::value(name, expected, x.len()));
+        }
+        finite(|| name.into(), x)?;
+    }
+    let Some(c) = system.constant() else { return Ok(()) };
+    for (name, a) in [("mass", c.mass), ("damping", c.damping), ("stiffness", c.stiffness)] {
+        if (a.nrows(), a.ncols()) != (n, n) {
+            let found = format!("{} × {}", a.nrows(), a.ncols());
+            let key = format!("constant().{name}");
+            return Err(SimulateError::value(key, format!("{n} × {n}"), found));
+        }
+    }
+    Ok(())
 }
 
 impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
@@ -83,48 +117,31 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
         const { assert!(D == 2 || D == 3, "contacts have 2 or 3 components") };
         scheme.validate()?;
         system.validate()?;
-        let n = system.size().dofs;
-        for (name, x) in [("q", q), ("v", v)] {
-            if x.len() != n {
-                let expected = format!("{n} entries, one for each degree of freedom");
-                return Err(SimulateError::value(name, expected, x.len()));
-            }
-            finite(|| name.into(), x)?;
-        }
-        require(|| "size().dofs".into(), n as f64, n > 0, "at least one degree of freedom")?;
-        if let Some(c) = system.constant() {
-            let all = [("mass", c.mass), ("damping", c.damping), ("stiffness", c.stiffness)];
-            for (name, a) in all {
-                let found = format!("{} × {}", a.nrows(), a.ncols());
-                if (a.nrows(), a.ncols()) != (n, n) {
-                    let key = format!("constant().{name}");
-                    return Err(SimulateError::value(key, format!("{n} × {n}"), found));
-                }
-            }
-        }
+        let size = system.size();
+        fits(&system, q, v)?;
+        require(
+            || "size().dofs".into(),
+            size.dofs as f64,
+            size.dofs > 0,
+            "at least one degree of freedom",
+        )?;
         let mut tools = Tools::new(&system, "auto", &SettingsMap::new())?;
-        if tools.matrices.mass(&system, q).is_err() {
-            let found = "one that is not, at the start";
-            return Err(SimulateError::value(
-                "mass",
-                "a symmetric positive definite matrix",
-                found,
-            ));
+        tools.matrices.mass(&system, q).map_err(|unfit| unfit.at(0.0))?;
+        let (mut gradients, mut at) = (Gradients::default(), q.to_vec());
+        gradients.evaluate(&system, 0.0, &mut at, &mut vec![]);
+        let mut bounces = false;
+        for c in 0..size.contacts {
+            let law = system.law(c, 0.0, q, v);
+            gradients.admit(c, &law)?;
+            bounces |= law.e > 0.0;
         }
-        let asymmetry = tools.matrices.asymmetry();
-        let expected = "0, of a symmetric matrix";
-        require(|| "asymmetry of mass".into(), asymmetry, asymmetry <= 1e-10, expected)?;
-        let mut directions = nonsmooth_linalg::Dense::zeros(D * system.size().contacts, n);
-        if !system.directions(0.0, q, &mut directions) {
-            for c in 0..system.size().contacts {
-                let mu = system.law(c, 0.0, q, v).mu;
-                let key = || format!("law({c}).mu");
-                require(key, mu, mu == 0.0, "0, since `directions` gives no tangents")?;
-            }
-        }
+        let limit = |k| matches!(system.row_law(k, 0.0, q, v), RowLaw::Limit { e } if e > 0.0);
+        bounces |= (0..size.rows).any(limit);
+        let warnings = scheme.activation.warning("scheme").filter(|_| bounces);
+        let warnings = warnings.into_iter().collect();
         let state = LagrangianState { q: q.to_vec(), v: v.to_vec(), ..LagrangianState::default() };
         let limits = Limits { tolerance: 1e-12, max_iterations: 100_000, ..Limits::default() };
-        Ok(Self { system, scheme, state, tools, limits })
+        Ok(Self { system, scheme, state, tools, limits, size, changed: false, warnings })
     }
 
     /// With contact problems solved by the solver of this name, with these settings.
@@ -160,9 +177,15 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
         &self.system
     }
 
-    /// The system, to be changed between steps: what a controller does. Its size must stay.
+    /// The system, to be changed between steps: what a controller does. Its size must stay; matrices that are not as they were are factorised anew in the next step.
     pub fn system_mut(&mut self) -> &mut L {
+        self.changed = true;
         &mut self.system
+    }
+
+    /// What is allowed but perhaps not meant, by the laws at the start.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
     }
 
     /// The scheme.
@@ -200,34 +223,51 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
     /// The velocity nearest to v, in the norm of M, that obeys the relations at q: what the relations on mean velocities leave of `Gᵀ v` is of second order in h. For output, and
     /// to begin with.
     ///
-    /// Errors: those of [`step`](Self::step).
+    /// What moves relations by itself, ∂φ/∂t, is taken by a difference of fourth order over a hundredth of the last step (of 1e-3 s before the first): 1e-10 of it is lost where φ turns
+    /// with ω = 1/h, less where it is slower, and `1e-14 |φ| / h` by rounding. Redundant relations are allowed.
+    ///
+    /// Errors: those of [`step`](Self::step); relations that no velocity obeys to 1e-9 of the terms of their rates, since they contradict each other or do not depend
+    /// on q; a rate that is no finite number; limits that end the solution before.
     pub fn consistent_velocity(&mut self) -> Result<Vec<f64>, SimulateError> {
-        let Self { system, state, tools, limits, .. } = self;
-        let size = system.size();
+        self.check()?;
+        let Self { system, state, tools, limits, size, .. } = self;
         let (mut q, mut v) = (state.q.clone(), state.v.clone());
-        if size.relations == 0 || tools.matrices.mass(system, &q).is_err() {
+        if size.relations == 0 {
             return Ok(v);
         }
+        tools.matrices.mass(system, &q).map_err(|unfit| unfit.at(state.t))?;
         let mut gradients = Gradients::default();
         gradients.evaluate(system, state.t, &mut q, &mut vec![]);
-        // The rate of φ by time alone; the unit of time of a mechanism is not known, that of its steps is.
+        // The unit of time of a mechanism is not known, that of its steps is.
         let span = if state.memory.h > 0.0 { state.memory.h } else { 1e-3 };
         let mut rate = vec![0.0; size.relations];
-        for sign in [-1.0, 1.0] {
-            let mut phi = vec![];
-            zero(&mut phi, size.relations);
-            system.relations(state.t + sign * span, &q, &mut phi);
-            rate.iter_mut().zip(&phi).for_each(|(r, phi)| *r += sign * phi / (2.0 * span));
+        differences::rate(state.t, span, &mut rate, |t, phi| system.relations(t, &q, phi));
+        let first = D * size.contacts;
+        let key = |k: usize| format!("relations[{k}]");
+        for (k, by_time) in rate.iter().enumerate() {
+            let of = [&[*by_time], gradients.line(first + k)];
+            for (name, x) in ["∂φ/∂t", "∂φ/∂q"].into_iter().zip(of) {
+                finite(|| format!("{name} of {}", key(k)), x)?;
+            }
         }
-        let (at, Tools { projection, matrices, .. }) = ((&gradients, D * size.contacts), tools);
-        projection.project_velocity(at, &rate, matrices, limits, &mut v)?;
+        let Tools { projection, matrices, .. } = tools;
+        // Whether that is solved is judged by what is left of the rates.
+        projection.project_velocity((&gradients, first), &rate, matrices, limits, &mut v)?;
+        for (k, by_time) in rate.iter().enumerate() {
+            let g = gradients.line(first + k);
+            let left = dot(g, &v) + by_time;
+            let terms = |v: &[f64]| g.iter().zip(v).map(|(g, v)| (g * v).abs()).sum::<f64>();
+            let size = by_time.abs() + terms(&v) + terms(&state.v);
+            let expected = "a rate of 0, which no velocity was found to make";
+            require(|| key(k), left, left.abs() <= CONSISTENT * size, expected)?;
+        }
         Ok(v)
     }
 
     /// Does one step of length h > 0, s.
     ///
-    /// Errors: h that is no positive number; a law that is none; a mass matrix that is not positive definite; a solver that does not apply. What numerics come to
-    /// is in the report.
+    /// Errors: h that is no positive number; a state of the wrong length or not finite; a system whose size has changed; a law that is none, or friction without tangents; a mass
+    /// matrix that is not symmetric and positive definite; a solver that does not apply. The state is then that before the step. What numerics come to is in the report.
     pub fn step(&mut self, h: f64) -> Result<StepReport, SimulateError> {
         drive::step(self, h)
     }
@@ -250,6 +290,7 @@ impl<L: Lagrangian<D>, const D: usize> LagrangianSimulation<L, D> {
     /// Errors: those of [`step`](Self::step).
     pub fn problem(&mut self, h: f64) -> Result<Option<FrictionLocal<D>>, SimulateError> {
         require(|| "h".into(), h, h > 0.0, "a positive number")?;
+        self.check()?;
         self.tools.problem(&self.system, &self.scheme, &self.state, h)
     }
 
@@ -301,6 +342,24 @@ impl<L: Lagrangian<D>, const D: usize> Driven for LagrangianSimulation<L, D> {
 
     fn halvings(&self) -> u8 {
         self.scheme.halvings
+    }
+
+    fn check(&mut self) -> Result<(), SimulateError> {
+        let Self { system, state, size, changed, .. } = self;
+        if system.size() != *size {
+            let found = format!("{:?}", system.size());
+            return Err(SimulateError::value(
+                "size()",
+                format!("{size:?}, as at the start"),
+                found,
+            ));
+        }
+        if *changed {
+            system.validate()?;
+            *changed = false;
+        }
+        require(|| "t".into(), state.t, true, "a finite time")?;
+        fits(system, &state.q, &state.v)
     }
 
     fn attempt(&mut self, h: f64) -> Result<StepReport, SimulateError> {

@@ -33,7 +33,7 @@ use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limit, Limits, Session, Status, settings::SettingsMap};
 
 use super::lines::Lines;
-use super::matrices::Matrices;
+use super::matrices::{Matrices, Unfit};
 use super::project::Projection;
 use super::state::LagrangianState;
 use super::{Lagrangian, LagrangianContact, LagrangianScheme};
@@ -259,18 +259,11 @@ impl<const D: usize> Tools<D> {
         if !(lines.is_finite() && m.drive.iter().all(|x| x.is_finite())) {
             return Err(Ended::Status(StepStatus::NotFinite));
         }
-        if matrices.mass(system, &m.middle).is_err() {
-            return Err(match matrices.is_finite() {
-                _ if budget::over() => Ended::Status(limit()),
-                false => Ended::Status(StepStatus::NotFinite),
-                true => Ended::Mistake(SimulateError::value(
-                    "mass",
-                    "a symmetric positive definite matrix",
-                    format!("one that is not, at t = {}", state.t),
-                )),
-            });
-        }
-        Ok(())
+        matrices.mass(system, &m.middle).map_err(|unfit| match unfit {
+            Unfit::Singular if budget::over() => Ended::Status(limit()),
+            _ if !matrices.is_finite() => Ended::Status(StepStatus::NotFinite),
+            _ => Ended::Mistake(unfit.at(state.t)),
+        })
     }
 
     /// The index set, by what forces alone make of the velocities.

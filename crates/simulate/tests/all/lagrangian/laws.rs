@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use nonsmooth_linalg::{Csc, Dense, factorisations};
 use nonsmooth_simulate::{
-    Control, Directions, Impact, Lagrangian, LagrangianScheme, LagrangianSimulation, Law,
-    LinearContact, LinearSystem, RelationsAt, RowLaw, Size, StepReport, StepStatus,
+    Activation, Control, Directions, Impact, Lagrangian, LagrangianScheme, LagrangianSimulation,
+    Law, LinearContact, LinearSystem, RelationsAt, RowLaw, Size, StepReport, StepStatus,
 };
 use nonsmooth_solve::{Limit, Limits, Solve, Status};
 
@@ -74,6 +74,33 @@ fn a_constant_system_is_factorised_once_for_each_step_size() {
     assert_eq!(factorisations(), before);
     point.step(5e-4).unwrap();
     assert_eq!(factorisations(), before + 1);
+}
+
+#[test]
+fn changed_matrices_are_made_anew() {
+    let system = LinearSystem { load: vec![1.0], ..LinearSystem::chain(&[1.0], &[]).unwrap() };
+    let system: LinearSystem<2> = system;
+    let mut point = LagrangianSimulation::new(system, theta(0.5), &[0.0], &[0.0]).unwrap();
+    let mut step = |change: &dyn Fn(&mut LinearSystem<2>)| {
+        let [q, v] = [point.state().q[0], point.state().v[0]];
+        change(point.system_mut());
+        assert!(point.step(1.0).unwrap().status.is_solved());
+        let LinearSystem { mass, damping, stiffness, .. } = point.system();
+        let [m, c, k] = [mass, damping, stiffness].map(|a| a.get(0, 0));
+        // (m + c/2 + k/4) (v⁺ − v) = 1 − c v − k (q + v/2).
+        let exact = v + (1.0 - c * v - k * (q + 0.5 * v)) / (m + 0.5 * c + 0.25 * k);
+        near(point.state().v[0], exact, 1e-12);
+    };
+    step(&|_| ());
+    step(&|s| s.mass = Csc::diagonal(&[4.0]));
+    step(&|s| s.stiffness = Csc::diagonal(&[1e4]));
+    step(&|s| s.damping = Csc::diagonal(&[3.0]));
+    let before = factorisations();
+    step(&|s| s.load[0] = 1.0);
+    assert_eq!(factorisations(), before);
+    point.system_mut().mass = Csc::diagonal(&[1.0, 1.0]);
+    let text = point.step(1.0).unwrap_err().to_string();
+    assert_eq!(text, "constant().mass: expected 1 × 1, found 2 × 2");
 }
 
 /// A rotor with a motor and a stop: one coordinate, two rows.
@@ -464,7 +491,7 @@ fn mistakes_are_named() {
         Csc::zeros(2, 2),
     );
     let text = said(LagrangianSimulation::new(skew, theta(0.5), &[0.0; 2], &[0.0; 2]).map(|_| ()));
-    assert_eq!(text, "asymmetry of mass: expected 0, of a symmetric matrix, found 0.5");
+    assert_eq!(text, "asymmetry of mass: expected 0, of a symmetric matrix, found 0.5, at t = 0");
     let tangents = Wrong { law: Some(Law::friction(0.5)), ..right };
     let text = said(new(tangents, &[0.0], &[0.0]));
     assert!(text.starts_with("law(0).mu: expected 0, since `directions` gives no"), "{text}");
@@ -500,4 +527,111 @@ fn a_force_that_is_no_number_ends_the_run_before_its_step() {
     assert!(report.stopped && !report.is_solved(), "{report}");
     assert_eq!(report.statuses["not_finite"], 1);
     assert!(system.state().q[0].is_finite() && (system.state().t - 0.01).abs() < 2e-3);
+}
+
+/// Two coordinates, functions of time, and mistakes that show only later.
+#[derive(Clone, Copy, Default)]
+struct Later {
+    mu: f64,
+    skew: f64,
+    force: f64,
+    e: f64,
+    relations: &'static [fn(f64) -> f64],
+}
+
+impl Lagrangian<2> for Later {
+    fn size(&self) -> Size {
+        Size::new(2).contacts(1).relations(self.relations.len())
+    }
+    fn mass(&self, q: &[f64], mass: &mut Dense) {
+        (mass[(0, 0)], mass[(1, 1)], mass[(0, 1)]) = (2.0, 2.0, self.skew * q[0]);
+    }
+    fn force(&self, t: f64, _: &[f64], _: &[f64], force: &mut [f64]) {
+        force[0] = if t > 0.9 { self.force } else { 0.0 };
+    }
+    fn gaps(&self, _: f64, q: &[f64], gaps: &mut [f64]) {
+        gaps[0] = 100.0 + q[1];
+    }
+    fn law(&self, _: usize, t: f64, _: &[f64], _: &[f64]) -> Law {
+        Law { mu: if t > 0.0 { self.mu } else { 0.0 }, e: self.e, ..Law::default() }
+    }
+    fn relations(&self, t: f64, q: &[f64], phi: &mut [f64]) {
+        self.relations.iter().zip(phi).for_each(|(f, phi)| *phi = q[0] - f(t));
+    }
+}
+
+fn later(system: Later, scheme: LagrangianScheme) -> LagrangianSimulation<Later, 2> {
+    LagrangianSimulation::new(system, scheme, &[0.0; 2], &[1.0, 0.0]).unwrap()
+}
+
+#[test]
+fn mistakes_are_named_when_they_happen() {
+    let mut friction = later(Later { mu: 0.5, ..Later::default() }, theta(0.5));
+    friction.step(0.1).unwrap();
+    let text = friction.step(0.1).unwrap_err().to_string();
+    assert!(text.starts_with("law(0).mu: expected 0, since `directions` gives no"), "{text}");
+    let mut skew = later(Later { skew: 0.5, ..Later::default() }, theta(0.5));
+    for _ in 0..2 {
+        let text = skew.step(0.1).unwrap_err().to_string();
+        assert!(text.starts_with("asymmetry of mass: expected 0"), "{text}");
+    }
+    for (k, name) in ["q", "q", "v", "t"].into_iter().enumerate() {
+        let mut wrong = later(Later::default(), theta(0.5));
+        let state = wrong.state_mut();
+        match k {
+            0 => state.q.push(1.0),
+            1 => state.q.clear(),
+            2 => state.v[1] = f64::NAN,
+            _ => state.t = f64::NAN,
+        }
+        let text = wrong.step(0.1).unwrap_err().to_string();
+        assert!(text.starts_with(&format!("{name}: expected")), "{text}");
+        assert!(wrong.run(1.0, 0.1, &mut ()).is_err() && wrong.problem(0.1).is_err());
+    }
+}
+
+#[test]
+fn half_a_step_is_none() {
+    let scheme = LagrangianScheme { halvings: 2, ..theta(0.5) };
+    // What fails is the second half, by a number that is none, or by a law that is none.
+    let wrong = Later { force: f64::NAN, ..Later::default() };
+    let mut whole = later(wrong, scheme);
+    let before = whole.state().clone();
+    let report = whole.step(1.0).unwrap();
+    assert_eq!((report.status, report.t, report.h), (StepStatus::NotFinite, 0.0, 1.0));
+    assert_eq!(*whole.state(), before);
+    let mut whole = later(Later { mu: 0.5, ..wrong }, scheme);
+    assert!(whole.step(1.0).is_err());
+    assert_eq!(*whole.state(), before);
+}
+
+#[test]
+fn consistent_velocities_are_those_of_fast_drives_or_none() {
+    let of = |relations| later(Later { relations, ..Later::default() }, theta(0.5));
+    let fast = &[(|t| 1e-3 * (1e3 * t).sin()) as fn(f64) -> f64];
+    near(of(fast).consistent_velocity().unwrap()[0], 1.0, 1e-9);
+    let twice: &'static [fn(f64) -> f64] = &[|t| 3.0 * t, |t| 3.0 * t];
+    near(of(twice).consistent_velocity().unwrap()[0], 3.0, 1e-9);
+    for (wrong, name) in [
+        (
+            &[(|t| t) as fn(f64) -> f64, |t| 2.0 * t] as &'static [_],
+            "relations[0]: expected a rate",
+        ),
+        (&[(|_| f64::NAN) as fn(f64) -> f64], "∂φ/∂t of relations[0]: expected finite"),
+    ] {
+        let text = of(wrong).consistent_velocity().unwrap_err().to_string();
+        assert!(text.starts_with(name), "{text}");
+    }
+}
+
+#[test]
+fn a_run_tells_violations_and_warns() {
+    let fast: &'static [fn(f64) -> f64] = &[|t| 3.0 + t];
+    let mut far = later(Later { relations: fast, ..Later::default() }, theta(0.5));
+    let report = far.run(0.1, 1e-2, &mut ()).unwrap();
+    near(report.joints, 3.0, 1e-6);
+    assert!(report.to_string().contains("relations violated by at most 3.0e0"), "{report}");
+    let scheme = LagrangianScheme { activation: Activation::Gap, ..theta(0.5) };
+    let warned = |e| later(Later { e, ..Later::default() }, scheme).warnings().len();
+    assert_eq!([warned(0.5), warned(0.0)], [1, 0]);
 }
