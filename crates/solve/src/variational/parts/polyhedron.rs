@@ -95,11 +95,14 @@ impl Polyhedron {
         worst(0..self.equalities, true).or_else(|| worst(self.equalities..all, false))
     }
 
-    /// Moves y until constraint k holds on its side, with equality. False where nothing makes it hold.
+    /// Moves y until constraint k holds on its side, with equality. False where nothing makes it hold, or the time is over.
     fn enter(&mut self, k: usize, sign: f64, y: &mut [f64]) -> bool {
         let g: Vec<f64> = self.rows[k].iter().map(|g| sign * g).collect();
         let mut multiplier = 0.0;
         loop {
+            if budget::over() {
+                return false;
+            }
             // z, the part of g that is orthogonal to the active rows, and g − z = Σ r_j g_j.
             let mut z = g.clone();
             let along = self.orthogonalise(&mut z);
@@ -147,13 +150,16 @@ impl Polyhedron {
         c
     }
 
-    /// Takes the j-th active row out; the basis of those after it is made again.
+    /// Takes the j-th active row out; the basis of those after it is made again, as far as the time reaches.
     fn leave(&mut self, j: usize) {
         self.active.remove(j);
         self.multipliers.remove(j);
         self.basis.truncate(j);
         self.columns.truncate(j);
         for at in j..self.active.len() {
+            if budget::over() {
+                return;
+            }
             let (k, sign) = self.active[at];
             let mut z: Vec<f64> = self.rows[k].iter().map(|g| sign * g).collect();
             let along = self.orthogonalise(&mut z);

@@ -52,7 +52,7 @@ pub struct SetCounts {
 /// | `absolute`, `literature`, `siconos` | `‖x − P_X(x − F(x))‖_∞` |
 ///
 /// The projections are the judge's own: of cones in the half-plane of the axis and the norm of the rest, of polyhedra by nonnegative least squares
-/// (LawsonHanson1974, ch. 23), exact but for rounding after finitely many steps. [`certify`](Problem::certify) evaluates expressions in doubled precision.
+/// (LawsonHanson1974, ch. 23) or, of many rows with few entries, by the proximal method of multipliers with Newton steps (Rockafellar1976), exact but for rounding after finitely many steps. [`certify`](Problem::certify) evaluates expressions in doubled precision.
 pub struct ViGauge {
     terms: Terms,
     /// φ that is known beforehand, of each row and of all.
@@ -69,6 +69,8 @@ pub struct ViGauge {
     tied: Vec<Vec<Vec<usize>>>,
     /// The projection of the start.
     start: Vec<f64>,
+    /// Whether it is known, or that there is none.
+    projected: bool,
     /// The sizes of it and of the set, and the length that F has near zero.
     size_of_start: f64,
     size_of_set: f64,
@@ -135,20 +137,7 @@ impl ViGauge {
         let n = problem.dim();
         let zeros = || vec![0.0; n];
         let mut terms = Terms::new(&*problem.F);
-        let mut start = problem.start.clone();
-        for (first, set) in problem.set.parts() {
-            let range = first..first + set.dim();
-            let from = &problem.start[range.clone()];
-            if violation(set, from) == 0.0 {
-                continue;
-            }
-            let mut y = vec![0.0; range.len()];
-            if Projection::new(set).onto(set, from, from, &mut y) && y.iter().all(|y| y.is_finite())
-            {
-                start[range].copy_from_slice(&y);
-            }
-        }
-        Self {
+        let mut out = Self {
             units: Units::new(&*problem.F, &mut terms, &problem.start, zeros(), reaches(problem)),
             terms,
             from: zeros(),
@@ -158,19 +147,47 @@ impl ViGauge {
             projections: [0, 1, 2]
                 .map(|_| problem.set.parts().iter().map(|(_, set)| Projection::new(set)).collect()),
             tied: problem.set.parts().iter().map(|(_, set)| tied(set)).collect(),
-            size_of_start: largest(&start),
+            size_of_start: 0.0,
             size_of_set: problem.set.size(),
-            start,
+            start: problem.start.clone(),
+            projected: false,
             length: Length::NotAsked,
             known: Known::default(),
             cut_short: false,
             gammas: zeros(),
+        };
+        out.project_start(problem);
+        out
+    }
+
+    /// The projection of the start, where the set has one.
+    fn project_start(&mut self, problem: &Vi) {
+        self.start.clone_from(&problem.start);
+        self.projected = true;
+        for (first, set) in problem.set.parts() {
+            let range = first..first + set.dim();
+            let from = &problem.start[range.clone()];
+            if violation(set, from) == 0.0 {
+                continue;
+            }
+            let mut y = vec![0.0; range.len()];
+            if Projection::new(set).onto(set, from, from, &mut y) && y.iter().all(|y| y.is_finite())
+            {
+                self.start[range].copy_from_slice(&y);
+            } else if budget::over() {
+                // Another time: until then nothing is decided.
+                self.projected = false;
+            }
         }
+        self.size_of_start = largest(&self.start);
     }
 
     /// F at x, and φ. `None` where F is not defined.
     fn look(&mut self, problem: &Vi, x: &[f64], precisely: bool) -> Option<f64> {
-        self.cut_short = false;
+        if !self.projected {
+            self.project_start(problem);
+        }
+        self.cut_short = !self.projected;
         self.known = self.count(problem, largest(x));
         let Self { terms, units, cut_short, .. } = self;
         let defined = units.look(&*problem.F, terms, x, precisely);
@@ -361,7 +378,7 @@ impl ViGauge {
             return None;
         }
         let rows = self.projections[1].iter().map(Projection::held).collect();
-        Some(Held { from: self.from.clone(), gamma, size, rows })
+        (!budget::over()).then(|| Held { from: self.from.clone(), gamma, size, rows })
     }
 
     pub(super) fn measure(&mut self, problem: &Vi, point: &LcpPoint, precisely: bool) -> Measure {

@@ -1,8 +1,7 @@
-//! The judge's projections.
+//! The projection on polyhedra by nonnegative least squares, with an orthonormal basis of the rows that hold.
 //!
 //! ```text
-//! polyhedron   y = p + s,  min ‖s‖  with  g_k s ≥ h_k, = h_k
-//!              min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
+//! min_u ‖[Gᵀ; hᵀ] u − e_{n+1}‖,  u_k ≥ 0 of inequalities;  s along the residual: the rows with u_k > 0 hold with equality
 //! ```
 //!
 //! There is no such y where the residual vanishes: the polyhedron is empty. Source: LawsonHanson1974, ch. 23. Cost: for k active rows `n k` operations for one that comes or goes. The rows on which a point lies that is taken to be near y are tried first, else those of the last projection, at the first time those that p violates; what is not
@@ -10,22 +9,11 @@
 
 use nonsmooth_linalg::budget;
 
-use super::super::Set;
-use super::{distance, norm};
+use super::super::norm;
+use super::Rows;
 
 /// Columns that are nearer to others than this are their combinations.
 const DEPENDENT: f64 = 1e-12;
-
-/// A projection with what it keeps from one time to the next.
-pub(in super::super) struct Projection {
-    /// Of a polyhedron: its rows with norm 1, `g_k` of −A and then of C, and their norms before.
-    rows: Vec<Vec<f64>>,
-    norms: Vec<f64>,
-    equalities: usize,
-    passive: Vec<usize>,
-    /// What was projected last, with b and d, and its projection.
-    last: Option<[Vec<f64>; 4]>,
-}
 
 /// A plane is no farther away, in units of what is violated, so that nothing overflows.
 const FARTHEST: f64 = 1e100;
@@ -36,111 +24,46 @@ const WITHIN: f64 = 16.0;
 /// Excesses smaller than this, in units of the row's terms, are those of a row on which a point lies.
 const ON: f64 = 1e-7;
 
-impl Projection {
-    pub(in super::super) fn new(set: &Set) -> Self {
-        let mut out =
-            Self { rows: vec![], norms: vec![], equalities: 0, passive: vec![], last: None };
-        if let Set::Polyhedron { A, C, .. } = set {
-            out.rows = vec![vec![0.0; A.ncols()]; A.nrows() + C.nrows()];
-            A.triplets().for_each(|(i, j, a)| out.rows[i][j] = -a);
-            C.triplets().for_each(|(i, j, a)| out.rows[A.nrows() + i][j] = a);
-            out.equalities = C.nrows();
-            for row in &mut out.rows {
-                let size = norm(row);
-                let size = if size > 0.0 { size } else { 1.0 };
-                row.iter_mut().for_each(|g| *g /= size);
-                out.norms.push(size);
-            }
+/// The rows with all their entries, and those that held last.
+pub(super) struct Dense {
+    rows: Vec<Vec<f64>>,
+    equalities: usize,
+    passive: Vec<usize>,
+}
+
+impl Dense {
+    pub(super) fn new(rows: &Rows) -> Self {
+        let mut dense = vec![vec![0.0; rows.variables]; rows.len()];
+        for (k, row) in dense.iter_mut().enumerate() {
+            let (of, g) = rows.row(k);
+            of.iter().zip(g).for_each(|(&j, g)| row[j] = *g);
         }
-        out
+        Self { rows: dense, equalities: rows.len() - rows.inequalities, passive: vec![] }
     }
 
-    /// `y = P_X(p)`, which may be near x. False where the set is empty, or the projection was not found.
-    pub(in super::super) fn onto(
-        &mut self,
-        set: &Set,
-        p: &[f64],
-        x: &[f64],
-        y: &mut [f64],
-    ) -> bool {
-        match set {
-            Set::Box { lower, upper } => {
-                for i in 0..p.len() {
-                    y[i] = p[i].max(lower[i]).min(upper[i]);
-                }
-                true
-            }
-            Set::Polyhedron { b, d, .. } => {
-                if let Some([from, of_b, of_d, to]) = &self.last
-                    && from == p
-                    && of_b == b
-                    && of_d == d
-                {
-                    y.copy_from_slice(to);
-                    return true;
-                }
-                let found = self.onto_polyhedron(b, d, p, x, y);
-                self.last = found.then(|| [p.to_vec(), b.clone(), d.clone(), y.to_vec()]);
-                found
-            }
-            Set::Ball { centre, radius } => {
-                let far = distance(p, centre);
-                let share = if far > *radius { radius / far } else { 1.0 };
-                for i in 0..p.len() {
-                    y[i] = if share < 1.0 { centre[i] + share * (p[i] - centre[i]) } else { p[i] };
-                }
-                true
-            }
-            Set::SecondOrderCone { .. } => {
-                // In the half-plane of (x_1, ‖x̄‖): onto the ray along (1, 1).
-                let (t, far) = (p[0], norm(&p[1..]));
-                let (height, share) = match (far <= t, far <= -t) {
-                    (true, _) => (t, 1.0),
-                    (_, true) => (0.0, 0.0),
-                    _ => (0.5 * t + 0.5 * far, (0.5 * t + 0.5 * far) / far),
-                };
-                y[0] = height;
-                for i in 1..p.len() {
-                    y[i] = share * p[i];
-                }
-                true
-            }
-            Set::Product(_) => true,
-        }
+    #[cfg(test)]
+    pub(super) fn into_rows(self) -> Vec<Vec<f64>> {
+        self.rows
     }
 
-    /// The rows that the last projection met with a force, and the equations, ascending; of dependent ones some that are not.
-    pub(in super::super) fn held(&self) -> Vec<usize> {
+    /// The inequalities that the last projection met with a force.
+    pub(super) fn pushing(&self, to: &mut Vec<usize>) {
         let bounds = self.rows.len() - self.equalities;
-        let pushed = self.passive.iter().copied().filter(|&k| k < bounds);
-        let all: Vec<usize> = (bounds..self.rows.len()).chain(pushed).collect();
-        let span = Span::of(all.iter().map(|&k| self.rows[k].iter().copied()));
-        let mut held: Vec<usize> =
-            all.iter().zip(&span.r).filter(|(_, r)| r.is_some()).map(|(&k, _)| k).collect();
-        held.sort_unstable();
-        held
+        to.extend(self.passive.iter().copied().filter(|&k| k < bounds));
     }
 
-    fn onto_polyhedron(
-        &mut self,
-        b: &[f64],
-        d: &[f64],
-        p: &[f64],
-        x: &[f64],
-        y: &mut [f64],
-    ) -> bool {
-        let Self { rows, norms, equalities, passive, .. } = self;
+    /// `y = P(p)`, of rows with these right sides. False where there is none, or the time is over.
+    pub(super) fn onto(&mut self, rhs: &[f64], p: &[f64], x: &[f64], y: &mut [f64]) -> bool {
+        let Self { rows, equalities, passive } = self;
         let (n, m, bounds) = (p.len(), rows.len(), rows.len() - *equalities);
-        let rhs = b.iter().map(|b| -b).chain(d.iter().copied());
         // What rounding leaves of a row on which p lies is no violation: at a vertex with more rows than unknowns these would contradict each other.
         let rounding = (n + 3) as f64 * f64::EPSILON;
-        let h = |(k, rhs): (usize, f64)| {
-            let at = rhs / norms[k];
+        let h = |(k, &at): (usize, &f64)| {
             let noise = rounding * (at.abs() + dot_moduli(&rows[k], p));
             let h = at - dot(&rows[k], p);
             (if h.abs() <= noise { 0.0 } else { h }, noise)
         };
-        let (mut h, mut noise): (Vec<f64>, Vec<f64>) = rhs.enumerate().map(h).unzip();
+        let (mut h, mut noise): (Vec<f64>, Vec<f64>) = rhs.iter().enumerate().map(h).unzip();
         y.copy_from_slice(p);
         // The unit is what p violates: beside a plane that is far away all that would be rounding.
         let violations = h.iter().enumerate().map(|(k, h)| if k < bounds { *h } else { h.abs() });
@@ -153,9 +76,8 @@ impl Projection {
         noise.iter_mut().for_each(|noise| *noise /= size);
         let column = |k: usize| rows[k].iter().copied().chain([h[k]]);
         let is_on = |&k: &usize| {
-            let at = b[k] / norms[k];
-            let size = at.abs() + dot_moduli(&rows[k], x);
-            (at + dot(&rows[k], x)).abs() <= ON * size
+            let size = rhs[k].abs() + dot_moduli(&rows[k], x);
+            (rhs[k] - dot(&rows[k], x)).abs() <= ON * size
         };
         let on: Vec<usize> = (0..bounds).filter(is_on).collect();
         passive.retain(|&k| k < bounds);
@@ -254,10 +176,9 @@ impl Projection {
                     }
                 }
                 None => {
-                    for (y, s) in y.iter_mut().zip(nearest(passive, rows, &h, n)) {
-                        *y += size * s;
-                    }
-                    return y.iter().all(|y| y.is_finite());
+                    let nearest = nearest(passive, rows, &h, n);
+                    y.iter_mut().zip(nearest).for_each(|(y, s)| *y += size * s);
+                    return !budget::over() && y.iter().all(|y| y.is_finite());
                 }
             }
         }
@@ -290,15 +211,21 @@ fn summed(x: &[f64], y: &[f64], f: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Columns one after the other: orthonormal ones with the same span as far as they are independent, and R by columns; of dependent ones none.
-struct Span {
+pub(super) struct Span {
     q: Vec<Vec<f64>>,
-    r: Vec<Option<Vec<f64>>>,
+    pub(super) r: Vec<Option<Vec<f64>>>,
 }
 
 impl Span {
-    fn of<C: Iterator<Item = f64>>(columns: impl Iterator<Item = C>) -> Self {
+    /// As far as the time reaches.
+    pub(super) fn of<C: Iterator<Item = f64>>(columns: impl Iterator<Item = C>) -> Self {
         let mut out = Self { q: vec![], r: vec![] };
-        columns.for_each(|column| out.push(column));
+        for column in columns {
+            if budget::over() {
+                break;
+            }
+            out.push(column);
+        }
         out
     }
 
@@ -312,7 +239,14 @@ impl Span {
         // What depends on others may not do so without them.
         let turns = self.r[first..].iter().all(Option::is_some) && 4 * gone.len() < self.r.len();
         if turns {
-            gone.iter().rev().for_each(|&at| self.remove(at));
+            for &at in gone.iter().rev() {
+                if budget::over() {
+                    self.q.clear();
+                    self.r.clear();
+                    return 0;
+                }
+                self.remove(at);
+            }
             return names.len();
         }
         self.r.truncate(first);
