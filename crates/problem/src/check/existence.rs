@@ -51,7 +51,7 @@ pub enum Existence {
         /// Why, in words: a theorem on the class of the matrix, or on the bounds.
         because: String,
     },
-    /// A point passes the check: a solution up to rounding.
+    /// A point passes the check: a solution of a problem whose rows differ by its relative residual, which may be more than rounding. (`exp(-x) = 0` has such points and no solution.)
     #[serde(rename = "nearly_proved")]
     NearlySolved {
         /// Its relative residual.

@@ -640,3 +640,101 @@ fn numbers_near_the_largest_double_are_judged_as_others_are() {
         assert!(!measure(&problem, &point(&[0.0; 2])).passes(0.1));
     }
 }
+
+// ------------------------------------------------------------------------------------------ rounding in q
+
+/// A bar on an elastic bed above a sloping plane, pulled up by a load at its middle: q is the load and, beyond it, the rounding of the plane's second differences. Rows and columns
+/// multiplied by powers of two, where `scaled`.
+fn bar(n: usize, scaled: bool) -> (Lcp, Vec<f64>) {
+    let plane = |i: usize| 0.1 + 0.3 * i as f64 / (n - 1) as f64;
+    let power = |i: usize, period: usize| (if scaled { 9 * (i % period) } else { 0 }) as i32;
+    let row = |i: usize| 2.0_f64.powi(power(i, 7));
+    let column = |j: usize| 2.0_f64.powi(-power(j, 5));
+    let entries = (0..n).flat_map(|i| {
+        let beside = [i.checked_sub(1), Some(i + 1).filter(|j| *j < n)].into_iter().flatten();
+        beside.map(move |j| (i, j, -1.0)).chain([(i, i, 2.0 + 0.01)])
+    });
+    let entries = entries.map(|(i, j, x)| (i, j, row(i) * x * column(j)));
+    let matrix = Csc::from_triplets(n, n, entries).unwrap();
+    let q: Vec<f64> = (0..n)
+        .map(|i| {
+            let noise = if i == 0 || i + 1 == n {
+                0.0
+            } else {
+                2.0 * plane(i) - plane(i - 1) - plane(i + 1)
+            };
+            let load = if (n / 2..n / 2 + 5).contains(&i) { 1.0 } else { 0.0 };
+            row(i) * (noise - load)
+        })
+        .collect();
+    let columns = (0..n).map(column).collect();
+    (Lcp::new(matrix, q).unwrap(), columns)
+}
+
+#[test]
+fn entries_of_q_that_are_rounding_are_no_units() {
+    let n = 101;
+    let z = eliminated(&bar(n, false).0);
+    assert!(z.iter().all(|z| *z > 0.0));
+    let plain = measure(&bar(n, false).0, &point(&z));
+    assert!(plain.relative < 1e-12, "{plain:?}");
+    // The same in other units of rows and columns.
+    let (scaled, columns) = bar(n, true);
+    assert!(scaled.q.iter().any(|q| *q != 0.0 && q.abs() < 1e-12));
+    let there: Vec<f64> = z.iter().zip(&columns).map(|(z, c)| z / c).collect();
+    let same = measure(&scaled, &point(&there));
+    assert!(same.relative < 1e-12, "{same:?}");
+    // What is wrong is wrong: an error of each variable, also of those that only rounding loads.
+    for i in [3, 20, n / 2, n - 8] {
+        let mut wrong = z.clone();
+        wrong[i] *= 1.0 + 1e-4;
+        let found = measure(&bar(n, false).0, &point(&wrong));
+        assert!(found.relative > 1e-6, "{i}: {found:?}");
+    }
+}
+
+#[test]
+fn small_loads_of_their_own_are_units() {
+    // Two parts without a connection, one with a load of 1e-20: that is no rounding of the other's.
+    let m = [
+        [2.0, -1.0, 0.0, 0.0],
+        [-1.0, 2.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, -1.0],
+        [0.0, 0.0, -1.0, 1.0],
+    ];
+    let apart = lcp(m, [-1.0, -1.0, -1e-20, -1e-20]);
+    // The second part has none: the sum of its rows is −2e-20. Far along the kernel the terms hide it, the loads do not.
+    let found = measure(&apart, &point(&[1.0, 1.0, 1e-8, 1e-8]));
+    assert!(found.relative > 0.5, "{found:?}");
+    // Coupled to the first part by an entry like all others, it is rounding.
+    let mut coupled = m;
+    (coupled[1][2], coupled[2][1]) = (-0.5, -0.5);
+    coupled[2][2] = 2.0;
+    coupled[3][3] = 2.0;
+    let coupled = lcp(coupled, [-1.0, -1.0, -1e-20, -1e-20]);
+    let z = eliminated(&coupled);
+    let found = measure(&coupled, &point(&z));
+    assert!(found.relative < 1e-14, "{found:?}");
+}
+
+/// `M z = −q` by elimination without pivoting.
+fn eliminated(problem: &Lcp) -> Vec<f64> {
+    let n = problem.q.len();
+    let mut a = vec![vec![0.0; n + 1]; n];
+    problem.M.for_each(|i, j, x| a[i][j] = x);
+    (0..n).for_each(|i| a[i][n] = -problem.q[i]);
+    for k in 0..n {
+        for i in k + 1..n {
+            let factor = a[i][k] / a[k][k];
+            for j in k..=n {
+                a[i][j] -= factor * a[k][j];
+            }
+        }
+    }
+    let mut z = vec![0.0; n];
+    for i in (0..n).rev() {
+        let sum: f64 = (i + 1..n).map(|j| a[i][j] * z[j]).sum();
+        z[i] = (a[i][n] - sum) / a[i][i];
+    }
+    z
+}

@@ -604,7 +604,8 @@ impl Tableau {
             if step == 0 {
                 first = x;
             }
-            if x.is_nan() || x <= 1e-14 * first {
+            // Where the time is over all ends here, and whoever looks next says so.
+            if x.is_nan() || x <= 1e-14 * first || budget::over() {
                 if step > 0 {
                     self.restart();
                 }
@@ -651,8 +652,8 @@ impl Tableau {
     /// Pivots to the basis where the z of `wanted` are basic, from data; passes over what makes it singular. The free variables and what they need
     /// come first.
     fn adopt(&mut self, wanted: &[bool]) {
-        // The largest diagonal entry first, as in a Cholesky factorisation with pivoting.
-        loop {
+        // The largest diagonal entry first, as in a Cholesky factorisation with pivoting. A basis that the end of the time leaves unfinished is one all the same.
+        while !budget::over() {
             let n = self.n;
             let left = || (0..n).filter(|i| wanted[*i] && !self.basic[*i]);
             let cheap = left().map(|i| (self.t[i * n + i].abs(), i));

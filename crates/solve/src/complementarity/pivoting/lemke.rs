@@ -409,6 +409,11 @@ impl Lemke {
             }
         };
         if !placed {
+            if phase == Phase::Cold && system.free() == 0 {
+                return Err(Step::Stuck(
+                    "the values of the first basis are beyond the range of double precision".into(),
+                ));
+            }
             if phase == Phase::Cold {
                 return Err(Step::Stuck(
                     "no regular basis holds the free variables: A is singular, and complementary variables do not mend it".into(),

@@ -4,8 +4,8 @@ use crate::check::proof::{Exactly, columns, exactly_near, exacts, just, worth_a_
 use crate::check::rows::Rows;
 use crate::check::{ConeSystem, Judged, Measure, Verdict};
 use crate::kinds::complementarity::judge::{
-    Pair, ROUNDING, RowCounts, RowStatus, Sum, distance, find_effects, find_units, finite, floor,
-    matters, put, rounding, share, unseen, verdict,
+    Noise, Pair, ROUNDING, RowCounts, RowStatus, Sum, distance, find_effects, find_units, finite,
+    floor, matters, put, rounding, share, unseen, verdict,
 };
 use crate::{Hlcp, HlcpPoint, Problem};
 use nonsmooth_linalg::{Matrix, norm};
@@ -26,6 +26,7 @@ pub struct HlcpGauge {
     scales: Vec<f64>,
     effects: [Vec<f64>; 2],
     w: Vec<f64>,
+    noise: Noise,
     rows: Rows,
 }
 
@@ -56,7 +57,10 @@ impl HlcpGauge {
         self.units.extend(problem.q.iter().map(|q| q.abs()));
         let [of_q, of_r] = &mut self.columns;
         let parts = [&problem.Q, &problem.R];
-        self.closed = find_units(&parts, &mut self.units, &mut [of_q, of_r], &mut self.w);
+        let (units, room) = (&mut self.units, &mut self.w);
+        self.closed = find_units(&parts, units, &mut [of_q, of_r], &mut self.noise, room);
+        // Room that served for columns.
+        self.w.resize(n, 0.0);
         self.rows.start(&problem.q);
     }
 

@@ -1,8 +1,8 @@
 //! The judge of problems in z with `w = M z + q`: LCP, MLCP and box LCP.
 
 use super::{
-    Pair, RowCounts, RowStatus, Sum, find_effects, find_units, finite, floor, put, rounding, share,
-    unseen, verdict, without_noise,
+    Noise, Pair, RowCounts, RowStatus, Sum, find_effects, find_units, finite, floor, put, rounding,
+    share, unseen, verdict, without_noise,
 };
 use crate::check::proof::{Exact, exactly_near, sum_of_products, worth_a_look};
 use crate::check::rows::Rows;
@@ -66,7 +66,8 @@ impl Data<'_> {
 ///
 /// The unit `ω_i` is what q and the bounds make of row i: `ω_i = max(|q_i|, max_j |M_ij| ζ_j)`, where `ζ_j = max_k |q_k| / |M_kj|`, at least the smaller
 /// modulus of two finite bounds, is the unit of column j; what q does not reach gets its unit from its
-/// neighbours, and where they have none the terms alone count. Without it a z that
+/// neighbours, and where they have none the terms alone count. An entry of q that is the rounding of a sum that cancels, below 1e-12 of the largest load of its component in the units in
+/// which the entries of M are near one (CurtisReid1972), is no unit either. Without it a z that
 /// runs to infinity in the kernel of M would solve every problem. The relative error is thus one of q as well as one of the whole row.
 ///
 /// A variable with an empty column is wrong unless it is exactly where it should be. Of an operator only products are known: `D_i = |q_i| + |(M z)_i| + s_i |z_i|`, and
@@ -87,6 +88,7 @@ pub struct LinearGauge {
     /// `max_k |M_kj| / D_k` at the point last measured.
     effects: Vec<f64>,
     w: Vec<f64>,
+    noise: Noise,
     rows: Rows,
 }
 
@@ -112,8 +114,8 @@ impl LinearGauge {
             (l, u) if data.bounds.is_some() => reach(l, u),
             _ => 0.0,
         }));
-        let Self { units, columns, w, .. } = self;
-        self.closed = find_units(&[data.matrix], units, &mut [columns], w);
+        let Self { units, columns, noise, w, .. } = self;
+        self.closed = find_units(&[data.matrix], units, &mut [columns], noise, w);
         // Room that served for columns.
         self.w.resize(m, 0.0);
         self.rows.start(data.q);

@@ -1,10 +1,12 @@
 //! The judges of complementarity problems: what an error is, of a row and of a pair, and what it is measured in.
 
 mod linear;
+mod noise;
 mod terms;
 
 pub use linear::LinearGauge;
 pub(super) use linear::{Data, InZ};
+pub(crate) use noise::Noise;
 pub(crate) use terms::{Terms, Units, to_the_edge};
 
 use serde::Serialize;
@@ -292,11 +294,32 @@ pub(crate) fn hand_on(
 }
 
 /// ω from the moduli of q in `units`, infinite where nothing is known; from those of bounds in `columns`, one for each matrix, what a distance counts in them.
-/// Whether the rest is known to have no connection. `next` is room.
+/// Whether the rest is known to have no connection. Entries of q that are the rounding of sums that cancel count as zero ([`Noise`]). `next` is room.
+pub(crate) fn find_units(
+    matrices: &[&Matrix],
+    units: &mut [f64],
+    columns: &mut [&mut Vec<f64>],
+    noise: &mut Noise,
+    next: &mut Vec<f64>,
+) -> bool {
+    noise.keep(units, columns);
+    let mut closed = spread(matrices, units, columns, next);
+    if Noise::jumps(matrices, units, next) && noise.without(matrices, units, columns) {
+        closed = spread(matrices, units, columns, next);
+    }
+    units.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = f64::INFINITY);
+    for (m, columns) in matrices.iter().zip(columns.iter_mut()) {
+        columns.fill(0.0);
+        m.for_each(|i, j, x| columns[j] = columns[j].max(x.abs() / units[i]));
+    }
+    closed
+}
+
+/// Units from neighbour to neighbour, zero where nothing is known; whether the rest is known to have no connection.
 ///
 /// Products, quotients and maxima only: whatever powers of two the rows and columns are multiplied by, the units go with them to the last bit. What is beyond the doubles is the
 /// largest of them, since infinity means that nothing is known.
-pub(crate) fn find_units(
+fn spread(
     matrices: &[&Matrix],
     units: &mut [f64],
     columns: &mut [&mut Vec<f64>],
@@ -337,11 +360,6 @@ pub(crate) fn find_units(
         if closed {
             break;
         }
-    }
-    units.iter_mut().filter(|x| **x == 0.0).for_each(|x| *x = f64::INFINITY);
-    for (m, columns) in matrices.iter().zip(columns.iter_mut()) {
-        columns.fill(0.0);
-        m.for_each(|i, j, x| columns[j] = columns[j].max(x.abs() / units[i]));
     }
     closed
 }
