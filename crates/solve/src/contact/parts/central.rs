@@ -23,13 +23,13 @@
 //! (`I − e nᵀ` has the inverse G because n has no normal component.) The second line is solved by
 //! [`Linearised`], its rows turned to the eigenvectors of S and divided by `1 + s_i²`: eigenvalues of S² run
 //! from τ to 1/τ, and in this form none of them swamps W. Mehrotra's predictor gives `d = −λ`, the corrector
-//! `d = −λ + λ \ (σ τ e − (S dx) ∘ (S⁻¹ dz))`. On the convex relaxation ρ is weighted by `1 − σ`, σ = (1 − α)³ with α the predictor's length: equations and complementarity then shrink alike, and a step
-//! that would be cut short centres only. (With the whole of ρ two of 77 problems with large mass ratios fewer are solved.)
+//! `d = −λ + λ \ (σ τ e − (S dx) ∘ (S⁻¹ dz))`. On the convex relaxation, and wherever some w_c is far from w̄, ρ is weighted by `1 − σ`, σ = (1 − α)³ with α the predictor's length: equations and complementarity then shrink alike, and a step
+//! that would be cut short centres only; one that is cut short all the same is computed anew without Mehrotra's term. (With the whole of ρ two of 77 problems with large mass ratios fewer are solved.)
 //!
 //! The exact law is not monotone, and its steps may shrink to nothing where those of the convex problem (n = 0 in G) do not: where asked for, a step that the boundary cuts short
 //! is computed anew with `G = I + γ e nᵀ`, γ < 1, which damps what is not monotone; s itself stays exact, so that the iterates converge to the law, linearly as long as γ < 1.
 //!
-//! On the relaxation x and z begin at the solution of `x + z = 0, ρ = 0`, that is of `min ½ rᵀW r + qᵀr + ½‖x‖²` in these units, each moved along e until it is inside L: with
+//! Where equations and complementarity shrink alike x and z begin at the solution of `x + z = 0, ρ = 0`, that is of `min ½ rᵀW r + qᵀr + ½‖x‖²` in these units, each moved along e until it is inside L: with
 //! it the equations never lag far behind complementarity. (From `x = z = e` they lag sixtyfold where masses differ by 10⁶, and steps of a hundredth centre without getting nearer.)
 //!
 //! A contact with mu = 0 has the half line in its normal component and `r_T = 0`.
@@ -114,6 +114,8 @@ pub struct Central<L, const D: usize> {
     kept: Vec<Pair<D>>,
     /// Equations and complementarity shrink alike.
     alike: bool,
+    /// The largest |log₂(w_c/w̄)|.
+    spread: f64,
     /// The part of ∂s/∂z that the step knows, in (0, 1], and the least.
     share: f64,
     least_share: f64,
@@ -150,6 +152,7 @@ impl<L, const D: usize> Default for Central<L, D> {
             now: None,
             kept: vec![],
             alike: false,
+            spread: 0.0,
             share: 1.0,
             least_share: 1.0,
         }
@@ -165,8 +168,20 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
 
     /// Begins with Coulomb's law. `smoothing` κ ≥ 0 makes `s = √(‖z_T‖² + (κτ)²)`.
     ///
-    /// `start`: impulses to begin near, kept `margin` inside the cones; else `x = z = e`.
+    /// `start`: impulses to begin near, kept `margin` inside the cones; else `x = z = e`, or near where the equations hold if the w_c are far from even.
     pub fn begin<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        smoothing: f64,
+        start: Option<(&[f64], f64)>,
+    ) -> Iterate {
+        let now = self.begin_centred(problem, state, smoothing, start);
+        self.near_equations_if_uneven(problem, state, now, start.is_none())
+    }
+
+    /// As [`begin`](Self::begin), but at `x = z = e` whatever the w_c: a path is followed from a point on it.
+    pub fn begin_centred<P: Linearised<D> + Disked<D, Law = L>>(
         &mut self,
         problem: &P,
         state: &mut P::State,
@@ -192,7 +207,8 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
     ) -> Iterate {
         self.s.clear();
         self.s.extend_from_slice(s);
-        self.enter_given(problem, state, start)
+        let now = self.enter_given(problem, state, start);
+        self.near_equations_if_uneven(problem, state, now, start.is_none())
     }
 
     /// Begins with the convex relaxation, s = 0, at the point nearest to where the equations hold: one factorisation.
@@ -204,6 +220,27 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         self.s.clear();
         self.s.resize(L::DISKS * problem.contacts(), 0.0);
         let now = self.enter_given(problem, state, None);
+        self.near_equations(problem, state, now)
+    }
+
+    fn near_equations_if_uneven<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        now: Iterate,
+        cold: bool,
+    ) -> Iterate {
+        let uneven = cold && self.spread > SPREAD;
+        if uneven { self.near_equations(problem, state, now) } else { now }
+    }
+
+    /// From the start `now` to the point nearest to where the equations hold; from there equations and complementarity shrink alike.
+    fn near_equations<P: Linearised<D> + Disked<D, Law = L>>(
+        &mut self,
+        problem: &P,
+        state: &mut P::State,
+        now: Iterate,
+    ) -> Iterate {
         self.alike = true;
         if self.enter_nearest(problem, state).is_err() {
             return now;
@@ -362,6 +399,8 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         let logs = self.weight.iter().map(|w| w.log2()).filter(|log| log.is_finite());
         let (sum, count) = logs.fold((0.0, 0.0), |(sum, count), log| (sum + log, count + 1.0));
         let mean = if count > 0.0 { sum / count } else { 0.0 };
+        let far = |w: &f64| (w.log2() - mean).abs();
+        self.spread = self.weight.iter().map(far).filter(|far| far.is_finite()).fold(0.0, f64::max);
         self.speed.clear();
         for w in &mut self.weight {
             let power = (0.5 * (mean - w.log2())).round();
@@ -443,31 +482,31 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
         let affine = self.reach().min(1.0);
         let tau = self.tau_after(affine);
         let ratio = (tau / before.tau).clamp(0.0, 1.0);
-        if self.alike {
-            let sigma = (1.0 - affine).powi(3);
-            self.aim(sigma * before.tau, true);
-            self.newton(problem, state, 1.0 - sigma);
-            return Ok(self.reach());
-        }
-        let mut sigma = ratio * ratio * ratio;
+        let mut sigma = if self.alike { (1.0 - affine).powi(3) } else { ratio * ratio * ratio };
         // Complementarity must not run ahead of the equations, which converge linearly where only a part of the slope is known, and a step that
         // the boundary cut short is followed by one that leads away from it.
         let lead = if self.share < 1.0 { LEAD_OF_PART } else { LEAD };
-        let behind = before.residual > lead * before.tau.max(0.1 * before.error);
+        let behind = !self.alike && before.residual > lead * before.tau.max(0.1 * before.error);
         let cut = self.now.is_some() && before.alpha > 0.0 && before.alpha < CUT;
         if behind || cut {
             sigma = sigma.max(BEHIND);
         }
         self.aim(sigma * before.tau, !(behind || cut));
-        self.newton(problem, state, 1.0);
+        self.newton(problem, state, self.share_of_rho(sigma));
         let reach = self.reach();
         if reach >= CUT || cut {
             return Ok(reach);
         }
         // The second-order term can point out of the cone: once more with the same factor, without it.
-        self.aim(sigma.max(BEHIND) * before.tau, false);
-        self.newton(problem, state, 1.0);
+        let sigma = sigma.max(BEHIND);
+        self.aim(sigma * before.tau, false);
+        self.newton(problem, state, self.share_of_rho(sigma));
         Ok(self.reach())
+    }
+
+    /// The weight of ρ in a step that aims at σ times the present complementarity.
+    fn share_of_rho(&self, sigma: f64) -> f64 {
+        if self.alike { 1.0 - sigma } else { 1.0 }
     }
 
     /// A smaller share of the slope of the exact law; false where there is none to be had.
@@ -924,6 +963,9 @@ impl<L: DiskLaw<D>, const D: usize> Central<L, D> {
 
 /// The largest power of two between the units of two contacts.
 const FACTOR: f64 = 200.0;
+
+/// All but paths that are followed begin near where the equations hold, as the relaxation does, where some w_c is this far from their mean, as a power of two.
+const SPREAD: f64 = 6.0;
 
 /// σ while the equations lag behind complementarity, and where the boundary cuts steps short.
 const BEHIND: f64 = 0.9;

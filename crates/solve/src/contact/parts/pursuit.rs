@@ -129,7 +129,7 @@ impl<L: DiskLaw<D>, const D: usize> Pursuit<L, D> {
         smoothing: f64,
         start: Option<(&[f64], f64)>,
     ) -> CentralIterate {
-        let now = self.core.begin(problem, state, smoothing, start);
+        let now = self.core.begin_centred(problem, state, smoothing, start);
         let n = self.core.pairs.len();
         for direction in [&mut self.tangent, &mut self.slope] {
             for list in [&mut direction.x, &mut direction.z] {
