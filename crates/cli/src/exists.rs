@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use nonsmooth_problem::AnyProblem;
-use nonsmooth_problem::check::{Existence, Impulses};
+use nonsmooth_problem::check::{Certificate, Existence, Impulses};
 use nonsmooth_solve::{Limits, existence};
 use serde_json::{Value, json};
 
@@ -181,9 +181,13 @@ fn text(file: &Path, size: &str, existence: &Existence, contacts: usize, seconds
             },
             exactly,
         )),
-        Existence::NearlyNoSolution { certificate, .. } => {
-            certificate.impulses().map(|impulses| (squeezed(impulses, contacts), nearly))
-        }
+        Existence::NearlyNoSolution { certificate, .. } => match certificate {
+            Certificate::Impulses(impulses) => Some((squeezed(impulses, contacts), nearly)),
+            Certificate::Separating { vectors } => {
+                Some((report::count(vectors.len(), "separating vector"), nearly))
+            }
+            _ => None,
+        },
         Existence::Unknown { .. } => None,
     };
     if let Some((rests, how)) = rests {

@@ -85,7 +85,7 @@ pub enum Existence {
     },
     /// There is no solution, up to rounding.
     NearlyNoSolution {
-        /// Normal impulses that nearly feel no motion and have negative power.
+        /// Normal impulses that nearly feel no motion and have negative power, or vectors that nearly close all cases.
         certificate: Certificate,
         /// The relative change of the data that would make it true.
         change: f64,
@@ -184,9 +184,14 @@ impl std::fmt::Display for Existence {
                 None => write!(f, "none, proved: {proof}"),
             },
             Self::NearlyNoSolution { certificate, change } => {
-                let what = match certificate.impulses() {
-                    Some(_) => "normal impulses that hardly feel any motion force bodies into each other",
-                    None => "a vector separates all cases up to rounding",
+                let what = match certificate {
+                    Certificate::Impulses(_) => {
+                        "normal impulses that hardly feel any motion force bodies into each other"
+                    }
+                    Certificate::Separating { vectors } if vectors.len() > 1 => {
+                        "vectors contradict all cases, up to rounding"
+                    }
+                    _ => "a vector separates all cases up to rounding",
                 };
                 write!(
                     f,

@@ -18,8 +18,8 @@ pub use crate::kinds::variational::{Held, SetCounts, SetStatus, ViGauge};
 pub use certificate::Certificate;
 pub use existence::{Existence, Kinematic, Kinematics};
 pub use proof::{
-    Column, ConeSystem, Constraint, Entries, Evidence, Exact, ExactVector, Monotone, NEAR, Proof,
-    rounded,
+    Case, Column, ConeSystem, Constraint, Entries, Evidence, Exact, ExactVector, Monotone, NEAR,
+    Proof, Sector, rounded,
 };
 pub(crate) use proof::{Exactly, Relaxed, weigh};
 pub use verdict::{Judged, StatusCounts, Verdict, VerdictOf};

@@ -23,7 +23,7 @@ pub const SMALL: usize = 300;
 const TICK: Duration = Duration::from_millis(5);
 /// Seconds that a task has after a limit to come back by itself, and the share of the time limit that it has in addition.
 const GRACE: f64 = 0.04;
-const SHARE: f64 = 0.04;
+const SHARE: f64 = 0.01;
 /// The same after Ctrl-C, when somebody waits.
 const CANCELLED: f64 = 0.1;
 /// The same where there is no time from the start: what can be had at once.

@@ -1,7 +1,7 @@
 //! Existence: planted problems, squeezed bodies, wedges that can jam, clamps at rest; in both forms, dimensions and any units.
 
 use nonsmooth_linalg::{Bsr, Csc, Delassus, Inverse};
-use nonsmooth_problem::check::{Existence, Judged, Kinematic};
+use nonsmooth_problem::check::{Certificate, Existence, Judged, Kinematic};
 use nonsmooth_problem::planted::Planted;
 use nonsmooth_problem::{
     FrictionGlobal, FrictionLocal, GlobalPoint, LocalPoint, Problem, RowsGlobal,
@@ -10,6 +10,8 @@ use nonsmooth_solve::contact::form::{Blockwise, Frictional};
 use nonsmooth_solve::existence::{decide, glance_at};
 use nonsmooth_solve::registry::{self, Registered};
 use nonsmooth_solve::{Limits, Status};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
 
 /// The verdict, its certificate verified once more.
 fn verdict<P: Blockwise<D> + Frictional<D> + Kinematic<D>, const D: usize>(
@@ -254,4 +256,83 @@ fn a_limit_ends_the_investigation() {
     let cancel = Some(std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true)));
     let limits = Limits { cancel, ..Limits::default() };
     assert_eq!(decide(&p, &limits), Existence::Unknown { why: "it was cancelled".into() });
+}
+
+/// A body in the plane between contacts that close on it, and the same in space: the other direction of friction of each contact moves a mass of its own that nothing else moves, so that it
+/// stays at rest in every solution, and both problems have the same ones.
+fn grip(seed: u64, contacts: usize, mu: f64) -> (FrictionGlobal<2>, FrictionGlobal<3>) {
+    let mut random = Pcg64Mcg::seed_from_u64(seed);
+    let (mut plane, mut space) = (vec![], vec![]);
+    let mut w = (vec![], vec![]);
+    for c in 0..contacts {
+        let angle: f64 = random.random_range(0.0..std::f64::consts::TAU);
+        let [n, t] = [[angle.cos(), angle.sin()], [-angle.sin(), angle.cos()]];
+        let place =
+            [-n[0] + random.random_range(-0.3..0.3), -n[1] + random.random_range(-0.3..0.3)];
+        for (k, d) in [n, t].into_iter().enumerate() {
+            for (i, x) in [d[0], d[1], place[0] * d[1] - place[1] * d[0]].into_iter().enumerate() {
+                plane.push((i, 2 * c + k, x));
+                space.push((i, 3 * c + k, x));
+            }
+        }
+        space.push((3 + c, 3 * c + 2, 1.0));
+        let closing = [-random.random_range(0.1..1.0), random.random_range(-0.5..0.5)];
+        w.0.extend(closing);
+        w.1.extend([closing[0], closing[1], 0.0]);
+    }
+    let m = [&[2.0, 2.0, 0.5][..], &vec![1.0; contacts]].concat();
+    let h = Csc::from_triplets(3, 2 * contacts, plane.into_iter()).unwrap();
+    let mus = vec![mu; contacts];
+    let in_plane =
+        FrictionGlobal::new(Csc::diagonal(&m[..3]), h, vec![0.0; 3], w.0, mus.clone()).unwrap();
+    let h = Csc::from_triplets(m.len(), 3 * contacts, space.into_iter()).unwrap();
+    let in_space = FrictionGlobal::new(Csc::diagonal(&m), h, vec![0.0; m.len()], w.1, mus).unwrap();
+    (in_plane, in_space)
+}
+
+/// The enumeration in the plane is exact and complete, and knows nothing of sectors.
+#[test]
+fn what_has_no_solution_in_the_plane_is_refuted_in_space() {
+    let (mut exactly, mut nearly, mut open, mut several, mut solvable) = (0, 0, 0, 0, 0);
+    for seed in 0..60 {
+        let (plane, space) = grip(seed, 2 + seed as usize % 3, 0.3 + 0.02 * seed as f64);
+        let found = [name(&space), name(&condensed(&space))];
+        match verdict(&plane) {
+            Existence::NoSolution { .. } => {
+                for found in found {
+                    match found {
+                        "no_solution" => exactly += 1,
+                        "nearly_no_solution" => nearly += 1,
+                        // What misses by less than sectors of two degrees tell.
+                        "criterion_refuted" => open += 1,
+                        other => panic!("{seed}: {other}"),
+                    }
+                }
+                several += usize::from(needs_all(&space));
+            }
+            solution => {
+                assert!(solution.is_proved(), "{seed}: {solution}");
+                assert!(found.iter().all(|f| !f.ends_with("no_solution")), "{seed}: {found:?}");
+                solvable += 1;
+            }
+        }
+    }
+    println!(
+        "{exactly} exactly, {nearly} nearly, {open} open; {several} by several, {solvable} solvable"
+    );
+    // A W that is stored has lost its kernel to rounding.
+    assert!(exactly >= 15 && nearly >= 15 && several >= 10 && solvable >= 10);
+    assert!(10 * open <= exactly + nearly);
+}
+
+/// Whether a proof has several vectors, of which some cannot be done without.
+fn needs_all(problem: &FrictionGlobal<3>) -> bool {
+    let Existence::NoSolution { proof } = decide(problem, &Limits::default()) else { return false };
+    let Certificate::Separating { vectors } = proof.certificate() else { return false };
+    let without = |k: usize| {
+        let mut vectors = vectors.clone();
+        vectors.remove(k);
+        Certificate::Separating { vectors }
+    };
+    (0..vectors.len()).any(|k| !problem.verify(&without(k)))
 }

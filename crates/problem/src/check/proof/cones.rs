@@ -5,6 +5,7 @@ use std::cmp::Ordering;
 use nonsmooth_linalg::{Compensated, budget};
 
 use super::exact::{Equation, Exact, double, exact, negative, rounded, satisfying};
+use super::sectors::Spatial;
 use super::statement::exacts;
 
 /// A column of a [`ConeSystem`]: its entries by row.
@@ -31,6 +32,8 @@ pub struct ConeSystem {
     pub unknowns: Vec<(Exact, Vec<(usize, Exact)>)>,
     /// Whether the system says all that the problem says.
     pub complete: bool,
+    /// Contacts in space with friction, where there are few: what is said of them above is little, see [`sectors`](super::sectors).
+    pub(crate) spatial: Vec<Spatial>,
     /// Rows that define bounds, and the two columns (with the entry ±1 there) that are their slacks.
     pub(crate) slack_rows: Vec<(usize, [usize; 2])>,
     /// Entries of other rows are left out.
@@ -87,28 +90,17 @@ impl ConeSystem {
 
     /// `yᵀ A_j` in doubled precision.
     fn about(&self, entries: &Entries, y: &[[f64; 2]], j: usize) -> About {
-        let (mut sum, mut size) = (Compensated::default(), 0.0);
-        for ((i, _), &x) in self.columns[j].iter().zip(&entries.0[j]) {
-            let [high, low] = y[*i];
-            if high != 0.0 {
-                sum.add_product(x, high);
-                sum.add_product(x, low);
-                size += (x * high).abs();
-            }
-        }
-        // Of 2 k terms (2 k u)² at most (OgitaRumpOishi2005), and u² of each y: four times as much.
-        let unit = (2 * self.columns[j].len() + 4) as f64 * f64::EPSILON;
-        About { value: sum.value(), size, error: unit * unit * size }
+        About::sum(self.columns[j].iter().zip(&entries.0[j]).map(|((i, _), &x)| (*i, x)), y)
     }
 
     /// The sign of `yᵀ A_j`: exact, and in rational numbers only where doubled precision does not tell.
-    fn sign(&self, entries: &Entries, y: &Vector, j: usize) -> Ordering {
+    pub(super) fn sign(&self, entries: &Entries, y: &Vector, j: usize) -> Ordering {
         let known = self.about(entries, &y.doubled, j).sign();
         known.unwrap_or_else(|| self.slope(y.exact, j).cmp(&Exact::ZERO))
     }
 
     /// `yᵀ A_j` and `Σ |y_i A_ij|`; of the former its rounding at most is lost.
-    fn measured(&self, entries: &Entries, y: &Vector, j: usize) -> (f64, f64) {
+    pub(super) fn measured(&self, entries: &Entries, y: &Vector, j: usize) -> (f64, f64) {
         let about = self.about(entries, &y.doubled, j);
         if about.is_in_range() {
             return (about.value, about.size);
@@ -211,7 +203,7 @@ impl ConeSystem {
 
     /// For a y that separates: the least error in some row that has a weight, over that weight and as a part of the largest such right-hand side, of whatever it separates b from:
     /// `|yᵀ(A t − b)| ≥ −yᵀ b`.
-    fn excess(&self, y: &[Exact], weights: &[Exact]) -> f64 {
+    pub(super) fn excess(&self, y: &[Exact], weights: &[Exact]) -> f64 {
         let size = |x: &Exact| if negative(x) { -x } else { x.clone() };
         let shares = self.rhs.iter().zip(weights).map(|(b, weight)| size(b) / weight);
         let largest = shares.max().unwrap_or(Exact::ZERO);
@@ -398,14 +390,14 @@ impl ConeSystem {
 pub struct Entries(Vec<Vec<f64>>);
 
 /// A vector in exact numbers and in doubles.
-struct Vector<'a> {
+pub(super) struct Vector<'a> {
     exact: &'a [Exact],
     /// The nearest double and the nearest to what that leaves; NaN where these are no two doubles' precision.
-    doubled: Vec<[f64; 2]>,
+    pub(super) doubled: Vec<[f64; 2]>,
 }
 
 impl<'a> Vector<'a> {
-    fn new(exact: &'a [Exact]) -> Self {
+    pub(super) fn new(exact: &'a [Exact]) -> Self {
         Self { exact, doubled: exact.iter().map(doubled).collect() }
     }
 }
@@ -423,15 +415,32 @@ fn doubled(x: &Exact) -> [f64; 2] {
 }
 
 /// A sum known up to an error, with the size of its terms.
-struct About {
-    value: f64,
-    size: f64,
-    error: f64,
+pub(super) struct About {
+    pub(super) value: f64,
+    pub(super) size: f64,
+    pub(super) error: f64,
 }
 
 impl About {
+    /// `Σ x y_i` over these (i, x), in doubled precision.
+    pub(super) fn sum(terms: impl Iterator<Item = (usize, f64)>, y: &[[f64; 2]]) -> Self {
+        let (mut sum, mut size, mut count) = (Compensated::default(), 0.0, 0);
+        for (i, x) in terms {
+            let [high, low] = y[i];
+            count += 1;
+            if high != 0.0 {
+                sum.add_product(x, high);
+                sum.add_product(x, low);
+                size += (x * high).abs();
+            }
+        }
+        // Of 2 k terms (2 k u)² at most (OgitaRumpOishi2005), and u² of each y: four times as much.
+        let unit = (2 * count + 4) as f64 * f64::EPSILON;
+        Self { value: sum.value(), size, error: unit * unit * size }
+    }
+
     /// Whether nothing that matters is below or beyond all doubles.
-    fn is_in_range(&self) -> bool {
+    pub(super) fn is_in_range(&self) -> bool {
         self.value.is_finite() && self.size > 1e-200 && self.size < 1e200
     }
 

@@ -6,6 +6,7 @@ use nonsmooth_linalg::budget;
 
 use super::cones::ConeSystem;
 use super::exact::Exact;
+use super::sectors::Claimed;
 use super::statement::Exactly;
 use crate::check::Certificate;
 
@@ -153,6 +154,16 @@ pub(crate) fn weigh(problem: &impl Exactly, certificate: &Certificate) -> Eviden
     let weights: Vec<f64> = (0..rows).map(|i| problem.weight(i)).collect();
     if let Some(found) = system.refutation(&seen, &vectors, &weights) {
         return Evidence::Proved(Proof::new(certificate, &vectors, found));
+    }
+    if let (Certificate::Separating { .. }, Some(claimed)) =
+        (certificate, Claimed::new(&system, &seen, &vectors))
+    {
+        if let Some(found) = claimed.refutation(&weights) {
+            return Evidence::Proved(Proof::new(certificate, &vectors, found));
+        }
+        if let Some(change) = claimed.nearness() {
+            return Evidence::Nearly { change };
+        }
     }
     // First as they are, then without the entries that may be noise.
     let mut nearly: Option<f64> = None;

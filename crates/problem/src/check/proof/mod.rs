@@ -11,6 +11,7 @@ mod exact;
 mod monotone;
 mod relaxation;
 mod rounding;
+mod sectors;
 mod statement;
 
 pub use cones::{Column, ConeSystem, Entries, NEAR};
@@ -18,10 +19,12 @@ pub use evidence::{Evidence, ExactVector, Proof};
 pub use exact::{Exact, rounded};
 pub use monotone::Monotone;
 pub use relaxation::Constraint;
+pub use sectors::{Case, Sector};
 
 pub(crate) use evidence::{Claim, weigh};
 pub(crate) use exact::{Equation, exact, negative, satisfying, sum_of_products};
 pub(crate) use monotone::{monotone, principal};
 pub(crate) use relaxation::Relaxed;
 pub(crate) use rounding::{exactly_near, worth_a_look};
+pub(crate) use sectors::{FEW as FEW_SPATIAL, Spatial};
 pub(crate) use statement::{Exactly, bounded, columns, exacts, just};

@@ -57,7 +57,7 @@ mod starts;
 
 use nonsmooth_linalg::budget::Pace;
 use nonsmooth_linalg::{Groups, budget};
-use nonsmooth_problem::check::{Existence, Kinematic};
+use nonsmooth_problem::check::{Certificate, Existence, Kinematic};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -159,6 +159,8 @@ const EARLY: usize = 20;
 const RUNAWAY: f64 = 1e7;
 /// An investigation of existence may take this long, in seconds.
 const INVESTIGATION: f64 = 2.0;
+/// Strategies in a row that have not halved the error, where all choices of the contacts' states are refuted up to rounding.
+const REFUTED: usize = 2;
 
 /// The workspace. The later stages' parts are made when they are first needed.
 pub struct HybridWork<P: Linearised<D> + Disked<D>, const D: usize> {
@@ -860,15 +862,20 @@ impl<const D: usize> OnContacts<Auto, D> {
         Step::Continue { estimate: error }
     }
 
-    /// Whether there is a solution, asked once.
+    /// Whether there is a solution: asked once, and the states of few contacts at the second change of strategy.
     fn investigated<P: Linearised<D> + Disked<D> + Kinematic<D>>(
         &self,
         problem: &P,
         work: &mut HybridWork<P, D>,
     ) -> Existence {
         let limits = Limits { time_limit: Some(INVESTIGATION), ..Limits::default() };
-        let decide = || existence::decide::<P, D>(problem, &limits);
-        work.existence.get_or_insert_with(decide).clone()
+        let decide = || existence::by_motions::<P, D>(problem, &limits);
+        let mut known = work.existence.get_or_insert_with(decide).clone();
+        if work.done.strategies == 1 {
+            known = existence::by_states(problem, known, &limits);
+            work.existence = Some(known.clone());
+        }
+        known
     }
 
     /// What follows from what is known of the existence of a solution, if something does.
@@ -922,7 +929,14 @@ impl<const D: usize> OnContacts<Auto, D> {
             return Step::NoSolution(proof.certificate().clone());
         }
         work.done.strategies += 1;
-        if self.0.strategies > 0 && work.controller.strategies() >= self.0.strategies {
+        let most = match &work.existence {
+            Some(Existence::NearlyNoSolution {
+                certificate: Certificate::Separating { .. },
+                ..
+            }) => self.0.strategies.min(REFUTED),
+            _ => self.0.strategies,
+        };
+        if self.0.strategies > 0 && work.controller.strategies() >= most {
             if let Some(Existence::NearlyNoSolution { certificate, .. }) = &work.existence {
                 return Step::NoSolution(certificate.clone());
             }

@@ -9,7 +9,7 @@
 //! whose solution is a motion and whose multipliers are the impulses that refute (`program`); for problems without a
 //! solution the same program without friction, a linear one. What is found is polished, made exact and verified by the judge's
 //! crate: a verdict never rests on a tolerance of the program. Problems of few contacts that these means leave open are decided by
-//! enumeration of their cases in exact arithmetic (`core/exact_cones.rs`).
+//! enumeration of their cases in exact arithmetic (`core/exact_cones.rs`), in space refuted case by case, with sectors of sliding directions (`sectors`).
 //!
 //! References: AcaryCadouxLemarechalMalick2011; KlarbringPang1998; GoulartChen2024.
 //!
@@ -17,7 +17,9 @@
 //! Fails: margins near rounding, and cones that touch the motions tangentially, stay unknown.
 
 mod approach;
+mod least_squares;
 mod program;
+mod sectors;
 
 use std::time::Instant;
 
@@ -86,6 +88,31 @@ pub fn glance(problem: &Friction) -> Existence {
 
 /// As [`of`], for a problem of a known kind.
 pub fn decide<P: Blockwise<D> + Disked<D> + Kinematic<D>, const D: usize>(
+    problem: &P,
+    limits: &Limits,
+) -> Existence {
+    let begun = Instant::now();
+    let found = by_motions(problem, limits);
+    by_states(problem, found, &limits.left(begun))
+}
+
+/// Where motions have not told, what the states of a few contacts in space tell.
+pub(crate) fn by_states<P: Blockwise<D> + Disked<D> + Kinematic<D>, const D: usize>(
+    problem: &P,
+    found: Existence,
+    limits: &Limits,
+) -> Existence {
+    use Existence::{CriterionRefuted, Unknown, Weak};
+    let open = matches!(found, CriterionRefuted { .. } | Weak { .. } | Unknown { .. });
+    if !open || has_bounds(problem) {
+        return found;
+    }
+    let _scope = limits.budget(Instant::now()).enter();
+    sectors::investigate(problem).unwrap_or(found)
+}
+
+/// As [`decide`], by motions, and by enumeration where contacts are polyhedral.
+pub(crate) fn by_motions<P: Blockwise<D> + Disked<D> + Kinematic<D>, const D: usize>(
     problem: &P,
     limits: &Limits,
 ) -> Existence {

@@ -1,6 +1,6 @@
 //! Contacts as parts of a [`ConeSystem`].
 
-use crate::check::proof::{exact, just};
+use crate::check::proof::{FEW_SPATIAL, Spatial, exact, just};
 use crate::check::{Column, ConeSystem, Exact, Law};
 use nonsmooth_linalg::Csc;
 
@@ -17,7 +17,8 @@ pub fn friction_rows<L: Law<D>, const D: usize>(laws: impl Iterator<Item = L>) -
 /// The impulses and velocities of contacts: columns of r as given, in the rows that begin with `first` the velocities u.
 ///
 /// The law in the plane: `0 ≤ u_N ⟂ r_N ≥ 0`, `u_T = a − b`, `0 ≤ a ⟂ mu r_N + r_T ≥ 0`, `0 ≤ b ⟂ mu r_N − r_T ≥ 0`: r_T < mu r_N where it moves
-/// is excluded, and the pairs of a resting contact may have a = b. In space with friction only `0 ≤ u_N ⟂ r_N ≥ 0`, `|r_Tk| ≤ mu r_N` is said, of rolling `|r_Rk| ≤ mu_r r_N`.
+/// is excluded, and the pairs of a resting contact may have a = b. In space with friction only `0 ≤ u_N ⟂ r_N ≥ 0`, `|r_Tk| ≤ mu r_N` is said, of rolling `|r_Rk| ≤ mu_r r_N`; of few
+/// contacts with Coulomb's friction the law is kept beside it ([`Spatial`]).
 pub(crate) fn contacts<L: Law<D>, const D: usize>(
     system: &mut ConeSystem,
     first: usize,
@@ -26,8 +27,17 @@ pub(crate) fn contacts<L: Law<D>, const D: usize>(
 ) -> Vec<(Exact, Vec<(usize, Exact)>)> {
     let mut unknowns = vec![];
     let rows_of_disk = (D - 1) / L::DISKS;
+    let spatial = D == 3 && L::DISKS == 1;
     for (c, law) in laws.iter().enumerate() {
         let row = |k: usize| first + D * c + k;
+        let mu = law.coefficient(0);
+        let components = if mu == 0.0 { 1 } else { D };
+        let own = &impulses[D * c..D * c + components];
+        // Of what nobody asks nothing has to be kept.
+        let asked = (0..D).any(|k| system.wants(row(k))) || own.iter().any(|r| !r.is_empty());
+        let keeps = spatial && asked && system.spatial.len() <= FEW_SPATIAL;
+        let kept = keeps.then(|| own.to_vec());
+        let before = system.columns.len();
         let mut normal = std::mem::take(&mut impulses[D * c]);
         let mut tangential = vec![];
         for k in 1..D {
@@ -60,6 +70,10 @@ pub(crate) fn contacts<L: Law<D>, const D: usize>(
         }
         let pair = [system.unit(row(0), 1), system.column(normal)];
         system.pairs.push(pair);
+        if let Some(impulses) = kept {
+            let own = (before..system.columns.len()).collect();
+            system.spatial.push(Spatial { row: row(0), mu, impulses, own });
+        }
         unknowns.push(just(pair[1]));
         for (coefficient, mut t) in tangential {
             if !t.1.is_empty() {
@@ -67,6 +81,9 @@ pub(crate) fn contacts<L: Law<D>, const D: usize>(
             }
             unknowns.push(t);
         }
+    }
+    if system.spatial.len() > FEW_SPATIAL {
+        system.spatial.clear();
     }
     unknowns
 }
