@@ -296,7 +296,8 @@ fn what_has_no_solution_in_the_plane_is_refuted_in_space() {
     let (mut exactly, mut nearly, mut open, mut several, mut solvable) = (0, 0, 0, 0, 0);
     for seed in 0..60 {
         let (plane, space) = grip(seed, 2 + seed as usize % 3, 0.3 + 0.02 * seed as f64);
-        let found = [name(&space), name(&condensed(&space))];
+        let local = condensed(&space);
+        let found = [name(&space), name(&local)];
         match verdict(&plane) {
             Existence::NoSolution { .. } => {
                 for found in found {
@@ -308,7 +309,7 @@ fn what_has_no_solution_in_the_plane_is_refuted_in_space() {
                         other => panic!("{seed}: {other}"),
                     }
                 }
-                several += usize::from(needs_all(&space));
+                several += usize::from(needs_all(&local));
             }
             solution => {
                 assert!(solution.is_proved(), "{seed}: {solution}");
@@ -320,19 +321,23 @@ fn what_has_no_solution_in_the_plane_is_refuted_in_space() {
     println!(
         "{exactly} exactly, {nearly} nearly, {open} open; {several} by several, {solvable} solvable"
     );
-    // A W that is stored has lost its kernel to rounding.
-    assert!(exactly >= 15 && nearly >= 15 && several >= 10 && solvable >= 10);
-    assert!(10 * open <= exactly + nearly);
+    // Of W, as it is stored, rounding has left no kernel.
+    assert!(exactly + nearly >= 30 && several >= 10 && solvable >= 10);
 }
 
-/// Whether a proof has several vectors, of which some cannot be done without.
-fn needs_all(problem: &FrictionGlobal<3>) -> bool {
-    let Existence::NoSolution { proof } = decide(problem, &Limits::default()) else { return false };
-    let Certificate::Separating { vectors } = proof.certificate() else { return false };
+/// Whether a refutation has several vectors, of which some cannot be done without.
+fn needs_all(problem: &FrictionLocal<3>) -> bool {
+    let found = decide(problem, &Limits::default());
+    let certificate = match &found {
+        Existence::NoSolution { proof } => proof.certificate(),
+        Existence::NearlyNoSolution { certificate, .. } => certificate,
+        _ => return false,
+    };
+    let Certificate::Separating { vectors } = certificate else { return false };
     let without = |k: usize| {
         let mut vectors = vectors.clone();
         vectors.remove(k);
         Certificate::Separating { vectors }
     };
-    (0..vectors.len()).any(|k| !problem.verify(&without(k)))
+    (0..vectors.len().min(10)).any(|k| !problem.evidence(&without(k)).holds())
 }

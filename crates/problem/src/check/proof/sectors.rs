@@ -364,7 +364,7 @@ impl<'a> Closing<'a> {
             let z = [0, 1, 2].map(|k| {
                 let about = About::sum(of(k), &vector.doubled);
                 // Nothing by their size may be terms below all doubles.
-                let hidden = about.size == 0.0 && of(k).any(|(i, _)| !y[i].is_zero());
+                let hidden = about.size == 0.0 && of(k).any(|(i, x)| x != 0.0 && !y[i].is_zero());
                 About { size: if hidden { f64::NAN } else { about.size }, ..about }
             });
             let near = [0, 1, 2].map(|k| rounded(&p[k]));
@@ -548,7 +548,12 @@ impl ConeSystem {
             weights[i] = rounded(&y[i]).abs();
         });
         let mended = satisfying(all(&tight), &y, &weights, BUDGET);
-        Some(ExactVector(mended.unwrap_or(y)))
+        let largest = p.iter().fold(0.0_f64, |l, p| l.max(p.abs()));
+        let is_near = |mended: &Vec<Exact>| {
+            let rows = self.spatial.iter().flat_map(|c| c.row..c.row + 3);
+            rows.zip(p).all(|(i, p)| (rounded(&mended[i]) - p).abs() <= NEAR * largest)
+        };
+        Some(ExactVector(mended.filter(is_near).unwrap_or(y)))
     }
 
     /// The relative change of the entries that makes y satisfy what columns beside the contacts in space ask of it, the two of a pair for themselves; `None` where that is more than
