@@ -212,8 +212,7 @@ impl<'a> Claimed<'a> {
         if system.spatial.is_empty() {
             return None;
         }
-        let mut own = vec![false; system.columns.len()];
-        system.spatial.iter().flat_map(|c| &c.own).for_each(|&j| own[j] = true);
+        let own = system.own();
         let columns: Vec<Vec<Vec<(usize, f64)>>> =
             system.spatial.iter().map(|c| c.impulses.iter().map(in_doubles).collect()).collect();
         let (mut closing, mut places) = (vec![], vec![]);
@@ -527,8 +526,7 @@ impl ConeSystem {
             }
         }
         self.slack_rows.iter().for_each(|(row, _)| weights[*row] = 0.0);
-        let mut own = vec![false; self.columns.len()];
-        self.spatial.iter().flat_map(|c| &c.own).for_each(|&j| own[j] = true);
+        let own = self.own();
         let equation = |terms: &Column| Equation { terms: terms.clone(), constant: Exact::ZERO };
         let others = self.free.iter().filter(|&&j| !own[j]).map(|&j| &self.columns[j]);
         let balance: Vec<&Column> = others.collect();
@@ -554,6 +552,13 @@ impl ConeSystem {
             rows.zip(p).all(|(i, p)| (rounded(&mended[i]) - p).abs() <= NEAR * largest)
         };
         Some(ExactVector(mended.filter(is_near).unwrap_or(y)))
+    }
+
+    /// Of each column whether it is one of the contacts in space.
+    fn own(&self) -> Vec<bool> {
+        let mut own = vec![false; self.columns.len()];
+        self.spatial.iter().flat_map(|c| &c.own).for_each(|&j| own[j] = true);
+        own
     }
 
     /// The relative change of the entries that makes y satisfy what columns beside the contacts in space ask of it, the two of a pair for themselves; `None` where that is more than

@@ -8,6 +8,8 @@
 //! References: LawsonHanson1974, ch. 23.
 //! Cost: `rows · columns` for one that comes, as much as all columns in use for one that goes.
 
+use nonsmooth_linalg::{dot, norm};
+
 /// A column that points less than this along what is left, both of length 1, is of no use.
 const ALONG: f64 = 1e-12;
 /// What is left of a column, of its length, that depends on those in use.
@@ -212,14 +214,6 @@ impl LeastSquares {
         self.t.fill(0.0);
         self.used.iter().zip(t).for_each(|(&j, t)| self.t[j] = *t);
     }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-fn norm(x: &[f64]) -> f64 {
-    dot(x, x).sqrt()
 }
 
 #[cfg(test)]

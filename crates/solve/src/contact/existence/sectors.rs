@@ -13,7 +13,7 @@
 //! References: LawsonHanson1974 (ch. 23) for the least squares.
 //! Cost: some ten microseconds a case and generator that comes or goes; problems without a solution of 2 to 8 contacts take some 30 to 3000 cases.
 
-use nonsmooth_linalg::budget;
+use nonsmooth_linalg::{budget, dot, norm};
 use nonsmooth_problem::check::{Case, Certificate, Evidence, ExactVector, Existence, Law, Sector};
 
 use super::least_squares::LeastSquares;
@@ -83,6 +83,12 @@ struct Open {
     used: Vec<(usize, usize)>,
 }
 
+/// A generator of a case: which contact it is of, and which of its generators it is, with the impulse, zero of a motion.
+struct Generator {
+    name: (usize, usize),
+    r: [f64; 3],
+}
+
 impl Search {
     /// `None` of loads that are none.
     fn new<P: Blockwise<D> + Disked<D>, const D: usize>(problem: &P) -> Option<Self> {
@@ -133,7 +139,7 @@ impl Search {
             if self.found.iter().rev().take(AGAIN).any(|v| self.closes(v, &cases, SURELY)) {
                 continue;
             }
-            let names = self.state(&cases, &used, &mut squares);
+            let generators = self.state(&cases, &used, &mut squares);
             if squares.solve() > SOLVED {
                 let vector = self.closing(&cases, squares.residual());
                 if self.closes(&vector, &cases, -NOTHING) {
@@ -141,10 +147,10 @@ impl Search {
                     continue;
                 }
             }
-            let c = self.branch(&cases, &names, &squares)?;
-            let positive = (0..names.len()).filter(|&j| squares.coefficient(j) > 0.0);
+            let c = self.branch(&cases, &generators, &squares)?;
+            let positive = (0..generators.len()).filter(|&j| squares.coefficient(j) > 0.0);
             let used: Vec<(usize, usize)> =
-                positive.map(|j| names[j]).filter(|u| u.0 != c).collect();
+                positive.map(|j| generators[j].name).filter(|u| u.0 != c).collect();
             for part in cases[c].parts(self.mu[c] > 0.0) {
                 let mut cases = cases.clone();
                 cases[c] = part;
@@ -155,28 +161,28 @@ impl Search {
         Some(self.found.iter().map(unscaled).collect())
     }
 
-    /// Puts a case as a least-squares problem; which contact each generator is of, and which of its generators it is.
+    /// Puts a case as a least-squares problem, with a column for each of these generators.
     fn state(
         &self,
         cases: &[Case],
         used: &[(usize, usize)],
         squares: &mut LeastSquares,
-    ) -> Vec<(usize, usize)> {
+    ) -> Vec<Generator> {
         let k = self.q.len();
         squares.begin(&self.q);
-        let mut names = vec![];
+        let mut generators = vec![];
         let mut column = vec![0.0; k];
         for (c, &case) in cases.iter().enumerate() {
             let mut number = 0;
-            let mut push = |column: &[f64], squares: &mut LeastSquares| {
+            let mut push = |column: &[f64], r: [f64; 3], squares: &mut LeastSquares| {
                 squares.push(column);
-                names.push((c, number));
+                generators.push(Generator { name: (c, number), r });
                 number += 1;
             };
             for u in motions(case) {
                 column.fill(0.0);
                 column[3 * c..3 * c + 3].copy_from_slice(&u);
-                push(&column, squares);
+                push(&column, [0.0; 3], squares);
             }
             for r in impulses(case, self.mu[c]) {
                 column.fill(0.0);
@@ -184,35 +190,29 @@ impl Search {
                     let of_w = &self.w[k * (3 * c + l)..][..k];
                     column.iter_mut().zip(of_w).for_each(|(x, w)| *x -= r * w);
                 }
-                push(&column, squares);
+                push(&column, r, squares);
             }
             // A velocity that may be anything.
             if is_free(case, self.mu[c]) {
                 squares.leave_out(3 * c + 1..3 * c + 3);
             }
         }
-        let start = (0..names.len()).filter(|&j| used.contains(&names[j]));
-        squares.start(start);
-        names
+        squares.start((0..generators.len()).filter(|&j| used.contains(&generators[j].name)));
+        generators
     }
 
     /// The contact whose states are to be told apart; `None` where all are told apart well enough.
     fn branch(
         &self,
         cases: &[Case],
-        names: &[(usize, usize)],
+        generators: &[Generator],
         squares: &LeastSquares,
     ) -> Option<usize> {
         let k = self.q.len();
         let mut r = vec![0.0; k];
-        let mut lists: Vec<Vec<[f64; 3]>> = vec![];
-        for (c, &case) in cases.iter().enumerate() {
-            let still = vec![[0.0; 3]; motions(case).len()];
-            lists.push([still, impulses(case, self.mu[c])].concat());
-        }
-        for (j, &(c, number)) in names.iter().enumerate() {
-            let t = squares.coefficient(j);
-            (0..3).for_each(|l| r[3 * c + l] += t * lists[c][number][l]);
+        for (j, generator) in generators.iter().enumerate() {
+            let (c, t) = (generator.name.0, squares.coefficient(j));
+            (0..3).for_each(|l| r[3 * c + l] += t * generator.r[l]);
         }
         let mut u = self.q.clone();
         for (w, r) in self.w.chunks(k).zip(&r).filter(|(_, r)| **r != 0.0) {
@@ -248,8 +248,7 @@ impl Search {
                 p[1..].fill(0.0);
             }
         }
-        let of_column = |w: &[f64]| -w.iter().zip(&p).map(|(w, p)| w * p).sum::<f64>();
-        let z = self.w.chunks(k).map(of_column).collect();
+        let z = self.w.chunks(k).map(|w| -dot(w, &p)).collect();
         Vector { p, z }
     }
 
@@ -267,9 +266,7 @@ impl Search {
                 Case::Slide(sector) => {
                     let away = |e: &[f64; 2]| p[1] * e[0] + p[2] * e[1] <= -room.max(0.0);
                     sector.ends().iter().all(away)
-                        && impulses(*case, mu)
-                            .iter()
-                            .all(|g| (0..3).map(|l| g[l] * z[l]).sum::<f64>() >= room)
+                        && impulses(*case, mu).iter().all(|g| dot(g, z) >= room)
                 }
             }
         })
@@ -339,10 +336,6 @@ fn impulses(case: Case, mu: f64) -> Vec<[f64; 3]> {
             vec![end(0, from), end(1, to), meet]
         }
     }
-}
-
-fn norm(x: &[f64]) -> f64 {
-    x.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
 #[cfg(test)]
